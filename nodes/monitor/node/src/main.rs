@@ -1,0 +1,2 @@
+//! homing-monitor-node
+fn main() {}

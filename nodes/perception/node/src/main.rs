@@ -1,0 +1,2 @@
+//! homing-perception-node
+fn main() {}

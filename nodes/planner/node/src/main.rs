@@ -1,0 +1,2 @@
+//! homing-planner-node
+fn main() {}

@@ -1,0 +1,2 @@
+//! homing-robot-node
+fn main() {}

@@ -1,0 +1,2 @@
+//! homing-sim-node
+fn main() {}

@@ -1,0 +1,4 @@
+//! The simulator that stands in for the robot's body: scenes, renderer, kinematics, episodes. Pure: no network, no clock.
+
+pub mod scene;
+pub mod textures;
