@@ -1,4 +1,5 @@
 //! The simulator that stands in for the robot's body: scenes, renderer, kinematics, episodes. Pure: no network, no clock.
 
+pub mod render;
 pub mod scene;
 pub mod textures;
