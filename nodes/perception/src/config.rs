@@ -1,0 +1,115 @@
+//! Every knob of perception, with its default.
+
+use crate::PerceptionError;
+use crate::lift::DepthModel;
+use crate::sift::SiftConfig;
+
+/// Which solver turns correspondences into a pose.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum PoseSolver {
+    /// Three-point kernel, local optimisation, robust refinement.
+    #[default]
+    LoRansac,
+    /// OpenCV's EPnP + RANSAC, as in SLING's published code; no refinement, no guided matching.
+    EpnpRansac,
+}
+
+/// When a goal counts as seen. All errors are angles, so that the same gates fit every camera.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct Gates {
+    /// n_th: fewest verified matches of a sighting (SLING 3.4).
+    pub n_inliers_min: usize,
+    /// Smallest share of the matches that a pose must explain.
+    pub inlier_share_min: f64,
+    /// Largest angular error of a verified match, radians.
+    pub error_rad_max: f64,
+    /// Fewest verified matches of a bearing without depth: a line binds a match less than a point.
+    pub n_bearing_min: usize,
+    /// Smallest share of the matches that a bearing must explain.
+    pub bearing_share_min: f64,
+}
+
+impl Default for Gates {
+    fn default() -> Self {
+        Self {
+            n_inliers_min: 15,
+            inlier_share_min: 0.15,
+            error_rad_max: 0.008,
+            n_bearing_min: 30,
+            bearing_share_min: 0.4,
+        }
+    }
+}
+
+/// Settings of a [`crate::GoalEstimator`].
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct PerceptionConfig {
+    /// Keypoints.
+    pub sift: SiftConfig,
+    /// Largest ratio of the matcher's ratio test.
+    pub ratio_max: f32,
+    /// Depth.
+    pub depth: DepthModel,
+    /// One standard deviation of a keypoint's position, pixels.
+    pub keypoint_sd_px: f64,
+    /// Pose solver.
+    pub solver: PoseSolver,
+    /// When a goal counts as seen.
+    pub gates: Gates,
+    /// Probability with which RANSAC finds the pose if there is one.
+    pub confidence: f64,
+    /// Most samples RANSAC draws.
+    pub iterations_max: usize,
+    /// Seed of RANSAC's samples; each frame mixes its stamp into it.
+    pub seed: u64,
+    /// Threads OpenCV may use, for the whole process; `None` leaves its own choice. Results do not depend on it.
+    pub threads: Option<u16>,
+}
+
+impl Default for PerceptionConfig {
+    fn default() -> Self {
+        Self {
+            sift: SiftConfig::default(),
+            ratio_max: 0.85,
+            depth: DepthModel::default(),
+            keypoint_sd_px: 0.7,
+            solver: PoseSolver::default(),
+            gates: Gates::default(),
+            confidence: 0.9999,
+            iterations_max: 10_000,
+            seed: 0,
+            threads: None,
+        }
+    }
+}
+
+impl PerceptionConfig {
+    /// # Errors
+    /// [`PerceptionError::Setting`] names the first setting outside its range.
+    pub fn check(&self) -> Result<(), PerceptionError> {
+        let g = &self.gates;
+        let rules = [
+            ("keypoints_max", self.sift.keypoints_max as f64, (8.0, 20_000.0), "8..=20000"),
+            ("contrast_min", self.sift.contrast_min, (0.0, 1.0), "0..=1"),
+            ("side_max_px", f64::from(self.sift.side_max_px), (64.0, 8192.0), "64..=8192"),
+            ("ratio_max", f64::from(self.ratio_max), (0.1, 1.0), "0.1..=1"),
+            ("depth.step_max", f64::from(self.depth.step_max), (1e-3, 10.0), "0.001..=10"),
+            ("depth.sd_m", self.depth.sd_m, (0.0, 1.0), "0..=1 m"),
+            ("depth.sd_per_m2", self.depth.sd_per_m2, (0.0, 1.0), "0..=1 /m"),
+            ("keypoint_sd_px", self.keypoint_sd_px, (0.01, 20.0), "0.01..=20 px"),
+            ("n_inliers_min", g.n_inliers_min as f64, (4.0, 10_000.0), "4..=10000"),
+            ("inlier_share_min", g.inlier_share_min, (0.0, 1.0), "0..=1"),
+            ("error_rad_max", g.error_rad_max, (1e-5, 0.2), "0.00001..=0.2 rad"),
+            ("n_bearing_min", g.n_bearing_min as f64, (6.0, 10_000.0), "6..=10000"),
+            ("bearing_share_min", g.bearing_share_min, (0.0, 1.0), "0..=1"),
+            ("confidence", self.confidence, (0.5, 1.0 - 1e-12), "0.5..1"),
+            ("iterations_max", self.iterations_max as f64, (1.0, 1e7), "1..=10000000"),
+        ];
+        for (name, value, (low, high), range) in rules {
+            if !(value >= low && value <= high) {
+                return Err(PerceptionError::Setting { name, value, range });
+            }
+        }
+        Ok(())
+    }
+}

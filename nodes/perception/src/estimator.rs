@@ -1,0 +1,155 @@
+//! The step: one RGB-D frame and the goal photo in, one goal estimate out.
+
+use std::time::{Duration, Instant};
+
+use homing_core::{
+    FeatureExtractor, Features, GoalEstimate, GoalPhoto, MatchedPoint, Matcher, RgbImage, RgbdFrame, Sighting,
+    StageTimes, UnseenReason,
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::locate::{Found, Views, locate};
+use crate::{MutualNearest, PerceptionConfig, PerceptionError, Sift};
+
+/// Verified matches handed on for people to look at.
+const MATCHED_POINTS_MAX: usize = 300;
+
+/// Perception with a goal: holds the photo's features so that each frame costs one extraction.
+pub struct GoalEstimator<E = Sift, M = MutualNearest> {
+    config: PerceptionConfig,
+    extractor: E,
+    matcher: M,
+    goal: Option<Goal>,
+}
+
+struct Goal {
+    photo: GoalPhoto,
+    features: Features,
+}
+
+impl GoalEstimator {
+    /// SIFT and mutual nearest neighbours.
+    ///
+    /// # Errors
+    /// [`PerceptionError::Setting`] for a setting out of range, [`PerceptionError::OpenCv`] if OpenCV refuses.
+    pub fn new(config: PerceptionConfig) -> Result<Self, PerceptionError> {
+        config.check()?;
+        Self::with_parts(config, Sift::new(config.sift)?, MutualNearest { ratio_max: config.ratio_max })
+    }
+}
+
+impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
+    /// With any extractor and matcher.
+    ///
+    /// # Errors
+    /// [`PerceptionError::Setting`] for a setting out of range, [`PerceptionError::OpenCv`] if OpenCV refuses.
+    pub fn with_parts(config: PerceptionConfig, extractor: E, matcher: M) -> Result<Self, PerceptionError> {
+        config.check()?;
+        if let Some(threads) = config.threads {
+            opencv::core::set_num_threads(i32::from(threads)).map_err(PerceptionError::opencv("set its threads"))?;
+        }
+        Ok(Self { config, extractor, matcher, goal: None })
+    }
+
+    /// Takes a photo to look for, replacing the last. A photo without texture is accepted and never seen.
+    ///
+    /// # Errors
+    /// [`PerceptionError::PhotoSize`] if photo and intrinsics disagree, or a fault of the extractor; the last goal then
+    /// stays.
+    pub fn set_goal(&mut self, photo: GoalPhoto) -> Result<(), PerceptionError> {
+        let (size, camera) = ((photo.rgb.width(), photo.rgb.height()), &photo.intrinsics);
+        if size != (camera.width(), camera.height()) {
+            return Err(PerceptionError::PhotoSize {
+                photo_width: size.0,
+                photo_height: size.1,
+                width: camera.width(),
+                height: camera.height(),
+            });
+        }
+        let features = self.extract(&photo.rgb)?;
+        tracing::debug!(goal = photo.id, keypoints = features.keypoints.len(), "goal photo taken");
+        self.goal = Some(Goal { photo, features });
+        Ok(())
+    }
+
+    /// Forgets the goal.
+    pub fn clear_goal(&mut self) {
+        self.goal = None;
+    }
+
+    /// The photo looked for.
+    #[must_use]
+    pub fn goal(&self) -> Option<&GoalPhoto> {
+        self.goal.as_ref().map(|goal| &goal.photo)
+    }
+
+    /// Keypoints of the photo looked for.
+    #[must_use]
+    pub fn goal_features(&self) -> Option<&Features> {
+        self.goal.as_ref().map(|goal| &goal.features)
+    }
+
+    /// Where the goal is, seen from this frame (SLING 3.3). The same frame and goal give the same estimate.
+    ///
+    /// # Errors
+    /// Faults of the extractor, the matcher or OpenCV; never what the image shows.
+    pub fn estimate(&mut self, frame: &RgbdFrame) -> Result<GoalEstimate, PerceptionError> {
+        let mut times = StageTimes::default();
+        let Some(goal_id) = self.goal.as_ref().map(|goal| goal.photo.id) else {
+            return Ok(unseen(frame, 0, UnseenReason::NoGoal));
+        };
+        let query = timed(&mut times.extract, || self.extract(&frame.rgb))?;
+        let Some(goal) = &self.goal else { return Ok(unseen(frame, 0, UnseenReason::NoGoal)) };
+        let matches = timed(&mut times.matching, || self.matcher.match_features(&query, &goal.features))
+            .map_err(|source| stage(self.matcher.name(), source))?;
+        let views = Views {
+            query: &query,
+            goal: &goal.features,
+            depth: &frame.depth,
+            camera: &frame.intrinsics,
+            goal_camera: &goal.photo.intrinsics,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed ^ frame.stamp.0);
+        let Found { sighting, verified } = timed(&mut times.pose, || locate(&views, &matches, &self.config, &mut rng))?;
+        let matched_points = verified.iter().take(MATCHED_POINTS_MAX).map(|&(q, g)| MatchedPoint {
+            query_px: (query.keypoints[q].x_px, query.keypoints[q].y_px),
+            goal_px: (goal.features.keypoints[g].x_px, goal.features.keypoints[g].y_px),
+        });
+        Ok(GoalEstimate {
+            stamp: frame.stamp,
+            goal_id,
+            sighting,
+            n_matches: matches.len(),
+            matched_points: matched_points.collect(),
+            times,
+        })
+    }
+
+    fn extract(&mut self, image: &RgbImage) -> Result<Features, PerceptionError> {
+        self.extractor.extract(image).map_err(|source| stage(self.extractor.name(), source))
+    }
+}
+
+fn stage(name: &str, source: impl core::error::Error + Send + Sync + 'static) -> PerceptionError {
+    PerceptionError::Stage { name: name.to_owned(), source: Box::new(source) }
+}
+
+fn unseen(frame: &RgbdFrame, goal_id: u64, reason: UnseenReason) -> GoalEstimate {
+    GoalEstimate {
+        stamp: frame.stamp,
+        goal_id,
+        sighting: Sighting::NotSeen { reason },
+        n_matches: 0,
+        matched_points: Vec::new(),
+        times: StageTimes::default(),
+    }
+}
+
+/// The clock is read for reporting alone: no result depends on it.
+fn timed<T>(into: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *into = start.elapsed();
+    result
+}
