@@ -26,6 +26,8 @@ pub struct Vertex {
 pub struct Mesh {
     /// Corners.
     pub vertices: Vec<Vertex>,
+    /// Linear RGB that multiplies the look, one per vertex; empty means white.
+    pub colours: Vec<[f32; 3]>,
     /// Indices into `vertices`, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].

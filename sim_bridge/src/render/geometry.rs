@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::render::light::Light;
-use crate::scene::{Material, Mesh, Scene, Vertex};
+use crate::scene::{Material, Mesh, Scene};
 
 /// Triangles of one cluster at most: small enough to cull well, large enough to keep the culling cheap.
 const CLUSTER_TRIANGLES: usize = 96;
@@ -161,13 +161,17 @@ fn part(mesh: &Mesh, triangles: &[[u32; 3]], material: &Material, light: &Light)
     used.sort_unstable();
     used.dedup();
     let place = |i: u32| used.partition_point(|&j| j < i) as u32;
-    let corner = |vertex: &Vertex| Corner {
-        position: vertex.position,
-        uv: vertex.uv.map(|c| if c.abs() < 1e5 { c } else { 0.0 }),
-        light: light.factor(vertex, material),
+    let corner = |i: u32| {
+        let vertex = &mesh.vertices[i as usize];
+        let colour = mesh.colours.get(i as usize).copied().unwrap_or([1.0; 3]);
+        Corner {
+            position: vertex.position,
+            uv: vertex.uv.map(|c| if c.abs() < 1e5 { c } else { 0.0 }),
+            light: light.factor(vertex, colour, material),
+        }
     };
     Part {
-        corners: used.iter().map(|&i| corner(&mesh.vertices[i as usize])).collect(),
+        corners: used.iter().map(|&i| corner(i)).collect(),
         triangles: triangles.iter().map(|t| t.map(place)).collect(),
     }
 }

@@ -15,10 +15,10 @@ impl<'a> Light<'a> {
     }
 
     /// What texels at this vertex are multiplied with, display exponent.
-    pub fn factor(&self, vertex: &Vertex, material: &Material) -> [f32; 3] {
+    pub fn factor(&self, vertex: &Vertex, colour: [f32; 3], material: &Material) -> [f32; 3] {
         let base = material.base_colour;
         let light = if material.unlit { [1.0; 3] } else { self.irradiance(vertex, material.double_sided) };
-        core::array::from_fn(|k| srgb::display_factor(light[k] * base[k].clamp(0.0, 1.0)))
+        core::array::from_fn(|k| srgb::display_factor(light[k] * (base[k] * colour[k]).clamp(0.0, 1.0)))
     }
 
     fn irradiance(&self, vertex: &Vertex, two_sided: bool) -> [f32; 3] {

@@ -24,7 +24,7 @@ fn material(texture: Option<usize>) -> Material {
 fn quad(corners: [[f32; 3]; 4], normal: [f32; 3], repeats: f32) -> Mesh {
     let uvs = [[0.0, 0.0], [repeats, 0.0], [repeats, repeats], [0.0, repeats]];
     let vertices = corners.iter().zip(uvs).map(|(position, uv)| Vertex { position: *position, normal, uv }).collect();
-    Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]], material: 0, solid: true }
+    Mesh { vertices, colours: vec![], triangles: vec![[0, 1, 2], [0, 2, 3]], material: 0, solid: true }
 }
 
 /// A wall across the view at `x`, facing the camera that looks along x.

@@ -1,0 +1,36 @@
+//! Looks of a document.
+
+use gltf::{Document, material::AlphaMode};
+
+use crate::scene::Material;
+
+/// Alpha below which a blended surface is left out: the rasterizer knows opaque pixels and holes only.
+const BLEND_CUTOFF: f32 = 0.5;
+
+/// One look per material of the document, and after them the default one.
+pub fn read(document: &Document) -> Vec<Material> {
+    let mut materials: Vec<Material> = document.materials().map(|material| look(&material)).collect();
+    materials.push(Material {
+        base_colour: [0.8, 0.8, 0.8, 1.0],
+        texture: None,
+        double_sided: false,
+        alpha_cutoff: 0.0,
+        unlit: false,
+    });
+    materials
+}
+
+fn look(material: &gltf::Material<'_>) -> Material {
+    let surface = material.pbr_metallic_roughness();
+    Material {
+        base_colour: surface.base_color_factor(),
+        texture: surface.base_color_texture().map(|info| info.texture().source().index()),
+        double_sided: material.double_sided(),
+        alpha_cutoff: match material.alpha_mode() {
+            AlphaMode::Opaque => 0.0,
+            AlphaMode::Mask => material.alpha_cutoff().unwrap_or(0.5),
+            AlphaMode::Blend => BLEND_CUTOFF,
+        },
+        unlit: material.unlit(),
+    }
+}
