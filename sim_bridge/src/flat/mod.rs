@@ -1,0 +1,148 @@
+//! Procedural flats: from a seed to rooms, doors, furniture and the scene they make.
+//!
+//! A flat is a rectangle of 9 to 14 m by 8 to 11.5 m, divided into 3 to 8 rooms by walls 0.12 m thick and 2.5 to 2.7 m
+//! high. Its rooms choose their looks from one small stock, so that the same chair, poster or floor turns up in several of
+//! them. Furniture leaves a way of at least 0.54 m between all doors of a room.
+
+mod builder;
+mod furnish;
+mod furniture;
+mod geometry;
+mod layout;
+mod passable;
+mod pen;
+mod shell;
+mod style;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+pub use geometry::{Rect, Side};
+pub use layout::{Axis, Door, Room, RoomKind, WALL_M};
+
+use crate::scene::Scene;
+use builder::SceneBuilder;
+use furnish::{Furnishing, Span};
+use layout::Plan;
+use shell::Walls;
+use style::{RoomStyle, Style, pick};
+
+/// A generated flat.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flat {
+    /// The seed it came from.
+    pub seed: u64,
+    /// Everything there is to see and to bump into.
+    pub scene: Scene,
+    /// 3 to 8 rooms.
+    pub rooms: Vec<Room>,
+    /// Doors and openings between them; every room can be reached.
+    pub doors: Vec<Door>,
+    /// From floor to ceiling, metres.
+    pub height_m: f64,
+}
+
+impl Flat {
+    /// Index of the room whose cell holds a point of the world frame, metres.
+    #[must_use]
+    pub fn room_at(&self, x_m: f64, y_m: f64) -> Option<usize> {
+        self.rooms.iter().position(|r| r.cell.contains(x_m, y_m))
+    }
+}
+
+/// Generates the flat of a seed: equal seeds give equal flats, bit for bit, on every machine.
+#[must_use]
+pub fn generate(seed: u64) -> Flat {
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let plan = Plan::draw(rng);
+    let height_m = rng.random_range(2.5..2.7);
+    let walls = shell::plan_walls(&plan, height_m, rng);
+    let style = Style::draw(rng);
+    let scene = &mut SceneBuilder::default();
+    for (room, walls) in plan.rooms.iter().zip(&walls) {
+        let look = style.room(room.kind, rng);
+        shell::build_room(scene, room, walls, &style, &look, height_m, rng);
+        furnish_room(scene, room, walls, &style, &look, rng);
+    }
+    let scene = core::mem::take(scene).finish(format!("flat seed {seed}"));
+    Flat { seed, scene, rooms: plan.rooms, doors: plan.doors, height_m }
+}
+
+fn furnish_room(
+    scene: &mut SceneBuilder,
+    room: &Room,
+    walls: &Walls,
+    style: &Style,
+    look: &RoomStyle,
+    rng: &mut ChaCha8Rng,
+) {
+    let mut furnishing = Furnishing::new(room, walls);
+    furnishing.furnish(rng);
+    for placed in &furnishing.placed {
+        placed.piece.build(&mut scene.pen(placed.spot), style, look, rng);
+    }
+    for (spot, size) in &furnishing.rugs {
+        furniture::rug(&mut scene.pen(*spot), pick(&style.rugs, rng), *size);
+    }
+    hang_posters(scene, room, &furnishing.spans, style, look, rng);
+}
+
+/// Hangs posters where the wall is free at eye height.
+fn hang_posters(
+    scene: &mut SceneBuilder,
+    room: &Room,
+    spans: &[Vec<Span>; 4],
+    style: &Style,
+    look: &RoomStyle,
+    rng: &mut ChaCha8Rng,
+) {
+    if room.kind == RoomKind::Bath {
+        return;
+    }
+    for (k, side) in Side::ALL.into_iter().enumerate() {
+        let length = room.floor.side_length(side);
+        let mut hung: Vec<(f64, f64)> = Vec::new();
+        for _ in 0..(length / 1.6) as u32 {
+            let (width, height) = *pick(&[(0.5, 0.7), (0.7, 0.5), (0.7, 1.0), (0.4, 0.4)], rng);
+            let from = rng.random_range(0.1..(length - width).max(0.2));
+            let (x, z) = ((from, from + width), (1.55 - 0.5 * height, 1.55 + 0.5 * height));
+            let hits = |s: &Span| {
+                s.along.0 < x.1 + 0.1 && x.0 - 0.1 < s.along.1 && s.height.0 < z.1 + 0.05 && z.0 - 0.05 < s.height.1
+            };
+            let crowds = |h: &(f64, f64)| h.0 < x.1 + 0.2 && x.0 - 0.2 < h.1;
+            let picture = pick(&style.posters, rng);
+            if x.1 < length - 0.08 && !spans[k].iter().any(hits) && !hung.iter().any(crowds) && rng.random_bool(0.75) {
+                furniture::poster(&mut scene.pen(room.floor.side(side)), picture, &look.wood, x, z);
+                hung.push(x);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_seeds_give_equal_flats_and_others_differ() {
+        let (a, b, c) = (generate(7), generate(7), generate(8));
+        assert_eq!(a, b);
+        assert_ne!(a.scene.meshes, c.scene.meshes);
+    }
+
+    #[test]
+    fn a_flat_has_a_sensible_number_of_finite_triangles() {
+        for seed in 0..20 {
+            let scene = generate(seed).scene;
+            let n: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+            assert!((6_000..=40_000).contains(&n), "seed {seed}: {n} triangles");
+            for mesh in &scene.meshes {
+                assert!(mesh.material < scene.materials.len());
+                assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
+                let finite =
+                    |v: &crate::scene::Vertex| v.position.iter().chain(&v.normal).chain(&v.uv).all(|f| f.is_finite());
+                assert!(mesh.vertices.iter().all(finite));
+            }
+        }
+    }
+}
