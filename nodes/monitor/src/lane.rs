@@ -10,7 +10,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use rerun::external::re_build_info::CrateVersion;
-use rerun::external::re_log_encoding::{EncodingOptions, Encoder};
+use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::grpc_server::GrpcServerSink;
 use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};

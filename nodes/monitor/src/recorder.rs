@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use rerun::log::ChunkBatcherConfig;
 use rerun::sink::{LogSink, MultiSink};
-use rerun::{RecordingStream, RecordingStreamBuilder};
+use rerun::{ApplicationId, RecordingStream, RecordingStreamBuilder};
 use thiserror::Error;
 
 use crate::blueprint;
@@ -249,7 +249,8 @@ fn serve_address(config: &RecorderConfig) -> Result<Option<SocketAddr>, Recorder
 fn open_lanes(config: &RecorderConfig, address: Option<SocketAddr>) -> Result<Vec<Lane>, RecorderError> {
     let mut lanes = Vec::new();
     if let Some(path) = &config.recording {
-        let writer = FileWriter::create(path).map_err(|source| RecorderError::Recording { path: path.clone(), source })?;
+        let writer =
+            FileWriter::create(path).map_err(|source| RecorderError::Recording { path: path.clone(), source })?;
         lanes.push(Lane::spawn(path.display().to_string(), writer));
     }
     if let Some(address) = address {
@@ -264,7 +265,7 @@ fn open_stream(config: &RecorderConfig, lanes: &[Lane]) -> Result<RecordingStrea
     // A tick of 50 ms: fresh to the eye, and twenty chunks a second and entity at most.
     let batching = ChunkBatcherConfig { flush_tick: Duration::from_millis(50), ..ChunkBatcherConfig::DEFAULT };
     let sinks: Vec<Box<dyn LogSink>> = lanes.iter().map(|lane| Box::new(lane.sink()) as Box<dyn LogSink>).collect();
-    let stream = RecordingStreamBuilder::new(config.application_id.as_str())
+    let stream = RecordingStreamBuilder::new(ApplicationId::new_or_unknown(&config.application_id))
         .batcher_config(batching)
         .buffered()
         .map_err(|e| RecorderError::Start { what: e.to_string() })?;
