@@ -58,4 +58,8 @@ pub trait GoalDiscovery: Send {
     fn reset(&mut self);
     /// Where to go next.
     fn next(&mut self, view: &DiscoveryView<'_>) -> Directive;
+    /// Places under consideration, odometry frame (x, y), metres, best first: for people to look at.
+    fn candidates_m(&self) -> Vec<(f64, f64)> {
+        Vec::new()
+    }
 }

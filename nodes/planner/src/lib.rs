@@ -1,1 +1,37 @@
-//! homing-planner
+//! From what the robot sees and what perception says about the goal to the next action.
+//!
+//! The pipeline of SLING (section 3) on a metric map: [`Planner::step`] remembers odometry, integrates depth into an
+//! occupancy grid, marks what blocked the body, fuses goal estimates where their images were taken, switches between
+//! goal discovery and last-mile navigation, plans with Fast Marching and picks one discrete action.
+//!
+//! Everything is a pure function of the events it is told: no clock, no randomness, no threads, no input or output.
+//! The same events give the same actions, bit for bit, on every machine.
+
+mod angles;
+mod arrival;
+mod config;
+pub mod discovery;
+mod event;
+mod fmm;
+mod goal_filter;
+mod hypothesis;
+mod local;
+mod mapper;
+mod planner;
+mod progress;
+mod projection;
+mod route;
+mod switches;
+mod terrain;
+
+pub use arrival::ArrivalConfig;
+pub use config::{BlindPolicy, BodyConfig, ConfigError, PlannerConfig, UnknownCells};
+pub use event::{Mission, Perception, PlannerObservation, StepEvent};
+pub use fmm::{Marcher, Until};
+pub use goal_filter::{FilterConfig, GoalFilter, Joined, Measurement};
+pub use local::{LocalChoice, LocalPlanner};
+pub use mapper::{Integrated, Mapper, MapperConfig};
+pub use planner::Planner;
+pub use route::{NoPath, Route, RoutePlanner};
+pub use switches::{SwitchConfig, Verdict};
+pub use terrain::{Terrain, Window};

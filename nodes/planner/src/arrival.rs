@@ -1,0 +1,133 @@
+//! The decision to stop: close enough that no step leads closer, turned to the photo's heading, and seen to be so.
+
+use homing_core::{GoalEstimate, PlanarPose, Stamp};
+
+use crate::config::BodyConfig;
+use crate::hypothesis::Hypothesis;
+use crate::local::{LocalChoice, LocalPlanner};
+use crate::terrain::Terrain;
+
+/// When the goal is reached.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct ArrivalConfig {
+    /// Within this distance the straight line counts instead of the map's cost, metres.
+    pub near_m: f64,
+    /// A step that shortens the distance by less is not worth it, metres.
+    pub gain_m: f64,
+    /// Once turning to the heading, only a step that shortens the distance by this much is taken, metres.
+    pub regain_m: f64,
+    /// Times the body may leave its final heading to come closer.
+    pub returns_max: u32,
+    /// Fresh estimates waited for at the goal before deciding without.
+    pub wait_steps_max: u32,
+}
+
+impl Default for ArrivalConfig {
+    fn default() -> Self {
+        Self { near_m: 0.6, gain_m: 0.03, regain_m: 0.10, returns_max: 3, wait_steps_max: 8 }
+    }
+}
+
+/// What the last metre asks for.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// Still on the way: follow the route.
+    Drive,
+    /// One more step.
+    Step(LocalChoice),
+    /// Position reached: turn to the heading.
+    Align(LocalChoice),
+    /// Position and heading reached, confirmed from here.
+    Arrived,
+    /// Position and heading reached, no estimate from here yet.
+    Wait,
+    /// Position and heading reached, and the photo's view is not there.
+    Refuted,
+}
+
+/// Progress of the last metre.
+#[derive(Clone, Debug, Default)]
+pub struct Arrival {
+    aligning: bool,
+    n_returns: u32,
+    in_place_since: Option<Stamp>,
+    n_waited: u32,
+    confirmed: bool,
+    n_denied: u32,
+}
+
+impl Arrival {
+    /// Begins anew: another goal, or the old one again.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// True while turning to the goal's heading.
+    pub fn is_aligning(&self) -> bool {
+        self.aligning
+    }
+
+    /// An estimate came; `agreed` with the hypothesis or not. Only images taken in place count.
+    pub fn hear(&mut self, estimate: &GoalEstimate, agreed: bool) {
+        if self.in_place_since.is_some_and(|since| estimate.stamp >= since) {
+            self.confirmed |= agreed;
+            self.n_denied += u32::from(!agreed);
+        }
+    }
+
+    /// What to do at `pose` for `hypothesis`; `end_m` is where its route ends.
+    pub fn approach(
+        &mut self,
+        config: &ArrivalConfig,
+        stamp: Stamp,
+        pose: &PlanarPose,
+        hypothesis: &Hypothesis,
+        end_m: (f64, f64),
+        ground: (&LocalPlanner, &Terrain, &BodyConfig),
+    ) -> Approach {
+        let (local, terrain, body) = ground;
+        let goal = &hypothesis.pose;
+        let blocked_off = goal.distance_to(end_m.0, end_m.1) > body.forward_m;
+        let aim = if blocked_off { end_m } else { (goal.x_m, goal.y_m) };
+        if pose.distance_to(aim.0, aim.1) > config.near_m {
+            self.leave();
+            return Approach::Drive;
+        }
+        let gain_m = if self.aligning { config.regain_m } else { config.gain_m };
+        let step = local.close_in(pose, aim, gain_m, terrain);
+        if step != LocalChoice::Nowhere && self.n_returns < config.returns_max {
+            self.n_returns += u32::from(self.aligning);
+            self.leave();
+            return Approach::Step(step);
+        }
+        self.aligning = true;
+        let turn = local.face(pose, goal.yaw_rad);
+        if turn != LocalChoice::Nowhere {
+            self.in_place_since = None;
+            return Approach::Align(turn);
+        }
+        self.judge(config, stamp)
+    }
+
+    fn judge(&mut self, config: &ArrivalConfig, stamp: Stamp) -> Approach {
+        if self.in_place_since.is_none() {
+            self.in_place_since = Some(stamp);
+            self.n_waited = 0;
+            self.confirmed = false;
+            self.n_denied = 0;
+        }
+        self.n_waited += 1;
+        if self.confirmed {
+            Approach::Arrived
+        } else if self.n_denied >= 3 || self.n_waited > config.wait_steps_max {
+            Approach::Refuted
+        } else {
+            Approach::Wait
+        }
+    }
+
+    fn leave(&mut self) {
+        self.aligning = false;
+        self.in_place_since = None;
+    }
+}

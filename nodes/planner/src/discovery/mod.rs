@@ -1,0 +1,8 @@
+//! Goal-discovery policies, one file each (SLING 3.2). The seam is [`homing_core::GoalDiscovery`].
+
+mod coverage;
+mod frontier;
+mod straight;
+
+pub use frontier::{Frontier, FrontierConfig};
+pub use straight::Straight;

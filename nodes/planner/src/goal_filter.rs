@@ -1,0 +1,279 @@
+//! Where the goal is, from many estimates of which some are wrong.
+//!
+//! SLING predicts once and drives (its limitation 3). Here every estimate counts: those that agree are fused, those that
+//! do not open another hypothesis, and a hypothesis that is looked at from near and not confirmed is dropped and its place
+//! remembered as one that lied.
+
+use homing_core::{Base, Camera, Goal, Odom, PlanarPose, Sighting, Stamp, Transform, wrap_angle};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+
+use crate::hypothesis::Hypothesis;
+pub use crate::hypothesis::Measurement;
+
+/// Squared Mahalanobis distance that 99.9 % of agreeing (x, y, yaw) stay below.
+const GATE: f64 = 16.3;
+const HYPOTHESES_MAX: usize = 8;
+const LIARS_MAX: usize = 16;
+
+/// How estimates are fused.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct FilterConfig {
+    /// Perception's standard deviations are multiplied by this: its matches share one view and one depth error.
+    pub inflation: f64,
+    /// Smallest standard deviation of position believed, metres.
+    pub position_sd_min_m: f64,
+    /// And this much more per metre of distance.
+    pub position_sd_per_m: f64,
+    /// Smallest standard deviation of heading believed, radians.
+    pub heading_sd_min_rad: f64,
+    /// Odometry drift per step, metres (one standard deviation).
+    pub drift_m: f64,
+    /// Odometry drift per step, radians (one standard deviation).
+    pub drift_rad: f64,
+    /// Views that should have shown the goal and did not, in a row, before its hypothesis is dropped.
+    pub misses_max: u32,
+    /// Within this distance a view that matches the photo's must show it, metres.
+    pub verify_m: f64,
+    /// And within this difference of heading, radians.
+    pub verify_rad: f64,
+    /// A place that lied is not believed again within this distance, metres.
+    pub liar_m: f64,
+    /// Nor within this difference of heading, radians.
+    pub liar_rad: f64,
+}
+
+impl Default for FilterConfig {
+    fn default() -> Self {
+        Self {
+            inflation: 1.5,
+            position_sd_min_m: 0.03,
+            position_sd_per_m: 0.03,
+            heading_sd_min_rad: 0.03,
+            drift_m: 0.005,
+            drift_rad: 0.002,
+            misses_max: 4,
+            verify_m: 1.0,
+            verify_rad: 0.5,
+            liar_m: 0.6,
+            liar_rad: 0.6,
+        }
+    }
+}
+
+/// What became of a measurement.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum Joined {
+    /// It agreed with a hypothesis.
+    Fused,
+    /// It opened a new one.
+    Opened,
+    /// Its place lied before.
+    Refused,
+}
+
+/// A place that perception named and that was not the goal.
+#[derive(Copy, Clone, Debug, PartialEq)]
+struct Liar {
+    pose: PlanarPose,
+    n_inliers: usize,
+}
+
+/// A bounded set of goal hypotheses.
+#[derive(Clone, Debug)]
+pub struct GoalFilter {
+    config: FilterConfig,
+    hypotheses: Vec<Hypothesis>,
+    liars: Vec<Liar>,
+}
+
+impl GoalFilter {
+    /// Empty.
+    #[must_use]
+    pub fn new(config: FilterConfig) -> Self {
+        Self { config, hypotheses: Vec::new(), liars: Vec::new() }
+    }
+
+    /// Forgets everything, liars included.
+    pub fn reset(&mut self) {
+        self.hypotheses.clear();
+        self.liars.clear();
+    }
+
+    /// The knobs.
+    #[must_use]
+    pub fn config(&self) -> &FilterConfig {
+        &self.config
+    }
+
+    /// One step of odometry drift.
+    pub fn drift(&mut self) {
+        let (position, yaw) = (self.config.drift_m.powi(2), self.config.drift_rad.powi(2));
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.drift(position, yaw);
+        }
+    }
+
+    /// The planar goal pose an estimate stands for: the base pose at which the robot's camera coincides with the goal camera,
+    /// `T_odom_goalbase = T_odom_base T_base_camera T_camera_goal T_base_camera^-1`, seen from above. A goal camera at
+    /// another height or pitch changes nothing else. `None` if a number is not finite or the covariance is not one.
+    #[must_use]
+    pub fn measure(
+        &self,
+        stamp: Stamp,
+        t_odom_base: &Transform<Odom, Base>,
+        t_base_camera: &Transform<Base, Camera>,
+        t_camera_goal: &Transform<Camera, Goal>,
+        covariance: &Matrix6<f64>,
+        n_inliers: usize,
+    ) -> Option<Measurement> {
+        let chain = t_odom_base.isometry() * t_base_camera.isometry() * t_camera_goal.isometry();
+        let t_odom_goalbase: Transform<Odom, Base> =
+            Transform::new(chain * t_base_camera.inverse().isometry() * Isometry3::identity());
+        let axes = (t_odom_base.rotation() * t_base_camera.rotation()).to_rotation_matrix();
+        let turned = |block: Matrix3<f64>| axes.matrix() * block * axes.matrix().transpose();
+        let position = turned(covariance.fixed_view::<3, 3>(0, 0).into()) * self.config.inflation.powi(2);
+        let rotation = turned(covariance.fixed_view::<3, 3>(3, 3).into()) * self.config.inflation.powi(2);
+        let pose = t_odom_goalbase.planar();
+        let here = t_odom_base.planar();
+        let range_m = here.distance_to(pose.x_m, pose.y_m);
+        let floor = (self.config.position_sd_min_m + self.config.position_sd_per_m * range_m).powi(2);
+        let mut planar = Matrix3::zeros();
+        planar.fixed_view_mut::<2, 2>(0, 0).copy_from(&position.fixed_view::<2, 2>(0, 0));
+        planar[(0, 0)] += floor;
+        planar[(1, 1)] += floor;
+        planar[(2, 2)] = rotation[(2, 2)] + self.config.heading_sd_min_rad.powi(2);
+        let sound = [pose.x_m, pose.y_m, pose.yaw_rad, range_m].iter().all(|v| v.is_finite())
+            && planar.iter().all(|v| v.is_finite())
+            && planar.cholesky().is_some();
+        sound.then_some(Measurement { stamp, pose, covariance: planar, n_inliers, range_m })
+    }
+
+    /// Fuses a measurement with the hypothesis it agrees with best, or opens a new one.
+    pub fn join(&mut self, measurement: &Measurement, step: u64) -> Joined {
+        let closest = (0..self.hypotheses.len())
+            .map(|i| (self.hypotheses[i].distance_square(measurement), i))
+            .filter(|(square, _)| *square <= GATE)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, i)) = closest {
+            self.hypotheses[i].fuse(measurement, step);
+            return Joined::Fused;
+        }
+        if self
+            .liars
+            .iter()
+            .any(|liar| self.near(&liar.pose, &measurement.pose) && measurement.n_inliers < 2 * liar.n_inliers)
+        {
+            return Joined::Refused;
+        }
+        if self.hypotheses.len() == HYPOTHESES_MAX {
+            let weakest =
+                (0..HYPOTHESES_MAX).min_by(|&a, &b| self.hypotheses[a].support.total_cmp(&self.hypotheses[b].support));
+            if let Some(weakest) = weakest {
+                self.hypotheses.remove(weakest);
+            }
+        }
+        self.hypotheses.push(Hypothesis::new(measurement, step));
+        Joined::Opened
+    }
+
+    /// Refines the best-fitting hypothesis by a direction seen from `t_odom_base`. Returns true if one agreed.
+    pub fn refine_by_bearing(
+        &mut self,
+        t_odom_base: &Transform<Odom, Base>,
+        t_base_camera: &Transform<Base, Camera>,
+        bearing_rad: f64,
+        bearing_sd_rad: f64,
+        step: u64,
+    ) -> bool {
+        let here = t_odom_base.planar();
+        let axis = camera_azimuth(t_base_camera);
+        let sd = (bearing_sd_rad * self.config.inflation).max(self.config.heading_sd_min_rad);
+        let Some(best) = self.best_index(step) else { return false };
+        let hypothesis = &mut self.hypotheses[best];
+        let (dx, dy) = (hypothesis.pose.x_m - here.x_m, hypothesis.pose.y_m - here.y_m);
+        let square = dx * dx + dy * dy;
+        if square < 0.25 {
+            return false;
+        }
+        let expected = libm::atan2(dy, dx);
+        let innovation = wrap_angle(here.yaw_rad + axis + bearing_rad - expected);
+        let jacobian = Vector3::new(-dy / square, dx / square, 0.0);
+        let agreed = hypothesis.fuse_scalar(&jacobian, innovation, sd * sd);
+        if agreed {
+            hypothesis.n_misses = 0;
+        }
+        agreed
+    }
+
+    /// The hypothesis with the most support that may be driven to at `step`.
+    #[must_use]
+    pub fn best(&self, step: u64) -> Option<&Hypothesis> {
+        self.best_index(step).map(|i| &self.hypotheses[i])
+    }
+
+    /// All hypotheses.
+    #[must_use]
+    pub fn hypotheses(&self) -> &[Hypothesis] {
+        &self.hypotheses
+    }
+
+    /// Perception looked from `pose` and `sighting` is what it said. Counts against the best hypothesis if the view was near
+    /// enough to the photo's that it should have agreed. Returns true when the hypothesis has been missed too often.
+    pub fn verify(&mut self, pose: &PlanarPose, sighting: &Sighting, agreed: bool, step: u64) -> bool {
+        let config = self.config;
+        let Some(best) = self.best_index(step) else { return false };
+        let hypothesis = &mut self.hypotheses[best];
+        let near = pose.distance_to(hypothesis.pose.x_m, hypothesis.pose.y_m) <= config.verify_m;
+        let alike = wrap_angle(pose.yaw_rad - hypothesis.pose.yaw_rad).abs() <= config.verify_rad;
+        let partly = matches!(sighting, Sighting::Bearing { .. });
+        if !agreed && near && alike && !partly {
+            hypothesis.n_misses += 1;
+        }
+        hypothesis.n_misses >= config.misses_max
+    }
+
+    /// The best hypothesis was wrong: drop it and do not believe its place again.
+    pub fn condemn(&mut self, step: u64) {
+        if let Some(best) = self.best_index(step) {
+            let hypothesis = self.hypotheses.remove(best);
+            if self.liars.len() == LIARS_MAX {
+                self.liars.remove(0);
+            }
+            self.liars.push(Liar { pose: hypothesis.pose, n_inliers: hypothesis.n_inliers_best });
+        }
+    }
+
+    /// No way leads to the best hypothesis, or it was not seen for long: leave it until `until_step`.
+    pub fn park(&mut self, step: u64, until_step: u64) {
+        if let Some(best) = self.best_index(step) {
+            self.hypotheses[best].parked_until = until_step;
+        }
+    }
+
+    /// Nothing else is left: believe liars and parked places again. Returns false if there was nothing to forgive.
+    pub fn forgive(&mut self) -> bool {
+        let any = !self.liars.is_empty() || self.hypotheses.iter().any(|h| h.parked_until > 0);
+        self.liars.clear();
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.parked_until = 0;
+        }
+        any
+    }
+
+    fn best_index(&self, step: u64) -> Option<usize> {
+        (0..self.hypotheses.len())
+            .filter(|&i| self.hypotheses[i].parked_until <= step)
+            .max_by(|&a, &b| self.hypotheses[a].support.total_cmp(&self.hypotheses[b].support).then(b.cmp(&a)))
+    }
+
+    fn near(&self, a: &PlanarPose, b: &PlanarPose) -> bool {
+        a.distance_to(b.x_m, b.y_m) <= self.config.liar_m
+            && wrap_angle(a.yaw_rad - b.yaw_rad).abs() <= self.config.liar_rad
+    }
+}
+
+/// Azimuth of the camera's optical axis in the base frame, radians.
+pub fn camera_azimuth(t_base_camera: &Transform<Base, Camera>) -> f64 {
+    let axis = t_base_camera.rotation() * Vector3::z();
+    libm::atan2(axis.y, axis.x)
+}

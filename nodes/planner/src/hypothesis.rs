@@ -1,0 +1,133 @@
+//! One place where the goal may be: a Gaussian over (x, y, yaw) of the base at the goal, and how far it is to be believed.
+
+use homing_core::{GoalHypothesis, PlanarPose, Stamp, wrap_angle};
+use nalgebra::{Matrix3, Vector3};
+
+/// A measured goal pose in the odometry frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measurement {
+    /// Stamp of the image.
+    pub stamp: Stamp,
+    /// Pose of the base at which the camera coincides with the goal camera, odometry frame.
+    pub pose: PlanarPose,
+    /// Covariance of (x, y, yaw), m and rad.
+    pub covariance: Matrix3<f64>,
+    /// Matches that agree.
+    pub n_inliers: usize,
+    /// Distance from the robot when the image was taken, metres.
+    pub range_m: f64,
+}
+
+/// A goal hypothesis with its history.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis {
+    /// Mean.
+    pub pose: PlanarPose,
+    /// Covariance of (x, y, yaw).
+    pub covariance: Matrix3<f64>,
+    /// Estimates fused.
+    pub n_fused: usize,
+    /// Sum of inliers of what agreed, less what spoke against it.
+    pub support: f64,
+    /// Most inliers of one estimate.
+    pub n_inliers_best: usize,
+    /// Stamp of the newest agreeing estimate.
+    pub last_seen: Stamp,
+    /// Step of the newest agreeing estimate.
+    pub last_seen_step: u64,
+    /// Smallest distance at which an estimate agreed, metres.
+    pub nearest_m: f64,
+    /// Views in a row that should have confirmed it and did not.
+    pub n_misses: u32,
+    /// Not to be driven to before this step: no way led there.
+    pub parked_until: u64,
+}
+
+impl Hypothesis {
+    /// From a first measurement.
+    pub fn new(measurement: &Measurement, step: u64) -> Self {
+        Self {
+            pose: measurement.pose,
+            covariance: measurement.covariance,
+            n_fused: 1,
+            support: measurement.n_inliers as f64,
+            n_inliers_best: measurement.n_inliers,
+            last_seen: measurement.stamp,
+            last_seen_step: step,
+            nearest_m: measurement.range_m,
+            n_misses: 0,
+            parked_until: 0,
+        }
+    }
+
+    /// Squared Mahalanobis distance of a measurement; infinite if the covariances are degenerate.
+    pub fn distance_square(&self, measurement: &Measurement) -> f64 {
+        let innovation = difference(&measurement.pose, &self.pose);
+        (self.covariance + measurement.covariance)
+            .try_inverse()
+            .map_or(f64::INFINITY, |inverse| (innovation.transpose() * inverse * innovation).x)
+    }
+
+    /// Fuses a measurement in information form: informations add, the mean is their weighted mean.
+    pub fn fuse(&mut self, measurement: &Measurement, step: u64) {
+        let (Some(own), Some(other)) = (self.covariance.try_inverse(), measurement.covariance.try_inverse()) else {
+            return;
+        };
+        let Some(covariance) = (own + other).try_inverse() else { return };
+        let correction = covariance * other * difference(&measurement.pose, &self.pose);
+        self.covariance = symmetric(&covariance);
+        self.shift(&correction);
+        self.n_fused += 1;
+        self.support += measurement.n_inliers as f64;
+        self.n_inliers_best = self.n_inliers_best.max(measurement.n_inliers);
+        self.last_seen = self.last_seen.max(measurement.stamp);
+        self.last_seen_step = step;
+        self.nearest_m = self.nearest_m.min(measurement.range_m);
+        self.n_misses = 0;
+    }
+
+    /// Fuses one scalar: `innovation` with variance `variance`, seen through the row `jacobian` over (x, y, yaw).
+    /// Returns false, and changes nothing, if it lies beyond three standard deviations.
+    pub fn fuse_scalar(&mut self, jacobian: &Vector3<f64>, innovation: f64, variance: f64) -> bool {
+        let gain = self.covariance * jacobian;
+        let spread = jacobian.dot(&gain) + variance;
+        if !(spread > 0.0 && innovation * innovation <= 9.0 * spread) {
+            return false;
+        }
+        self.shift(&(gain * (innovation / spread)));
+        self.covariance = symmetric(&(self.covariance - gain * gain.transpose() / spread));
+        true
+    }
+
+    /// Odometry drifts between the robot and the place: the older the sighting, the less sure.
+    pub fn drift(&mut self, position_variance: f64, yaw_variance: f64) {
+        self.covariance[(0, 0)] += position_variance;
+        self.covariance[(1, 1)] += position_variance;
+        self.covariance[(2, 2)] += yaw_variance;
+    }
+
+    /// For people and recordings.
+    pub fn report(&self) -> GoalHypothesis {
+        GoalHypothesis {
+            pose: self.pose,
+            covariance: self.covariance,
+            n_fused: self.n_fused,
+            last_seen: self.last_seen,
+        }
+    }
+
+    fn shift(&mut self, by: &Vector3<f64>) {
+        self.pose.x_m += by.x;
+        self.pose.y_m += by.y;
+        self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + by.z);
+    }
+}
+
+/// `a - b` with the yaw wrapped.
+fn difference(a: &PlanarPose, b: &PlanarPose) -> Vector3<f64> {
+    Vector3::new(a.x_m - b.x_m, a.y_m - b.y_m, wrap_angle(a.yaw_rad - b.yaw_rad))
+}
+
+fn symmetric(m: &Matrix3<f64>) -> Matrix3<f64> {
+    (m + m.transpose()) * 0.5
+}

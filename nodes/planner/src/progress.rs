@@ -1,0 +1,70 @@
+//! Is the body where its commands should have brought it: blocked forwards, being stuck, odometry that jumps.
+
+use homing_core::{Action, MotionOutcome, Odometry, PlanarPose, wrap_angle};
+
+use crate::config::BodyConfig;
+
+/// Longer than any step between two observations of a lockstep run, metres.
+const JUMP_MARGIN_M: f64 = 0.6;
+const JUMP_MARGIN_RAD: f64 = 1.2;
+
+/// Watches what became of the commands.
+#[derive(Clone, Debug, Default)]
+pub struct Progress {
+    /// Forwards in a row that were blocked.
+    pub n_blocked: u32,
+    /// Turns still to make to get away from where the body is stuck.
+    escape_turns: u32,
+    n_escapes: u32,
+}
+
+impl Progress {
+    /// Begins anew.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// True if the last action was a forward that did not come through (SLING: it moved less than 0.10 m).
+    pub fn was_blocked(
+        &mut self,
+        last: Action,
+        outcome: Option<&MotionOutcome>,
+        moved_m: f64,
+        body: &BodyConfig,
+    ) -> bool {
+        if last != Action::Forward {
+            return false;
+        }
+        let forward_m = outcome.map_or(moved_m, |o| o.moved.x_m);
+        let blocked =
+            forward_m < 0.4 * body.forward_m || outcome.is_some_and(|o| o.blocked && forward_m < 0.8 * body.forward_m);
+        self.n_blocked = if blocked { self.n_blocked + 1 } else { 0 };
+        blocked
+    }
+
+    /// Width of the obstacle to mark for the last blocked forward, metres: wider the longer it goes on (at most 9 cells).
+    pub fn bump_width_m(&self, resolution_m: f64) -> f64 {
+        let cells = (1 + 2 * self.n_blocked.saturating_sub(1)).min(9);
+        f64::from(cells) * resolution_m
+    }
+
+    /// No forward led anywhere: turn away for a while, alternately left and right.
+    pub fn begin_escape(&mut self, body: &BodyConfig) {
+        self.n_escapes += 1;
+        self.escape_turns = ((core::f64::consts::FRAC_PI_2 / body.turn_rad).ceil() as u32).clamp(1, 24);
+    }
+
+    /// The next turn of an escape, if one is under way.
+    pub fn escape(&mut self) -> Option<Action> {
+        self.escape_turns = self.escape_turns.checked_sub(1)?;
+        Some(if self.n_escapes % 2 == 1 { Action::TurnLeft } else { Action::TurnRight })
+    }
+}
+
+/// True if the body cannot have come from one reading to the next: it was carried, or its odometry restarted.
+pub fn jumped(from: &Odometry, to: &Odometry, body: &BodyConfig) -> bool {
+    let seconds = to.stamp.since(from.stamp).as_secs_f64();
+    let (a, b): (PlanarPose, PlanarPose) = (from.t_odom_base.planar(), to.t_odom_base.planar());
+    a.distance_to(b.x_m, b.y_m) > body.linear_m_s_max * seconds + JUMP_MARGIN_M
+        || wrap_angle(b.yaw_rad - a.yaw_rad).abs() > body.angular_rad_s_max * seconds + JUMP_MARGIN_RAD
+}
