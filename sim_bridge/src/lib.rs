@@ -1,7 +1,17 @@
 //! The simulator that stands in for the robot's body: scenes, renderer, kinematics, episodes. Pure: no network, no clock.
 
+pub mod arena;
+pub mod body;
+pub mod constants;
+pub mod episode;
 pub mod flat;
+pub mod geodesic;
 pub mod gltf_scene;
+pub mod laser;
+pub mod nav_grid;
+mod raster;
 pub mod render;
 pub mod scene;
+pub mod score;
+pub mod simulator;
 pub mod textures;

@@ -1,0 +1,284 @@
+//! Episodes: where a robot starts and which photo it is shown, drawn as NRNS draws them.
+
+use homing_core::{Base, Camera, Intrinsics, IntrinsicsError, PlanarPose, RgbImage, Transform, wrap_angle};
+use nalgebra::{Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::arena::{Arena, SceneRef};
+use crate::constants::{
+    CAMERA_HEIGHT, CAMERA_HEIGHT_M, CAMERA_HFOV_RAD, CAMERA_WIDTH, CURVED_HEADING_RAD, CURVED_RATIO, GOAL_DEPTH_M_MIN,
+};
+use crate::geodesic::GeodesicField;
+use crate::scene::World;
+
+/// Position and heading on the floor, world frame.
+#[derive(Copy, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FloorPose {
+    /// Metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Counter-clockwise from the x axis, radians.
+    pub yaw_rad: f64,
+}
+
+impl From<FloorPose> for PlanarPose {
+    fn from(p: FloorPose) -> Self {
+        PlanarPose { x_m: p.x_m, y_m: p.y_m, yaw_rad: p.yaw_rad }
+    }
+}
+
+/// A level camera on a pole: what took the goal photo.
+#[derive(Copy, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Viewpoint {
+    /// Above the floor, metres.
+    pub height_m: f64,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Horizontal field of view, radians.
+    pub hfov_rad: f64,
+}
+
+impl Default for Viewpoint {
+    /// The robot's own camera.
+    fn default() -> Self {
+        Self { height_m: CAMERA_HEIGHT_M, width: CAMERA_WIDTH, height: CAMERA_HEIGHT, hfov_rad: CAMERA_HFOV_RAD }
+    }
+}
+
+impl Viewpoint {
+    /// The camera's intrinsics.
+    ///
+    /// # Errors
+    /// [`IntrinsicsError`] for sizes and fields of view that no camera has.
+    pub fn intrinsics(&self) -> Result<Intrinsics, IntrinsicsError> {
+        Intrinsics::from_hfov(self.width, self.height, self.hfov_rad)
+    }
+
+    /// Where the camera sits on a body that stands on the floor: level, looking ahead.
+    #[must_use]
+    pub fn t_base_camera(&self) -> Transform<Base, Camera> {
+        // Columns: the camera's right, down and forward in the base's axes.
+        let r = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        Transform::from_rotation(&r, Vector3::new(0.0, 0.0, self.height_m))
+    }
+
+    /// The photo that is taken with this camera from a place in an arena.
+    ///
+    /// # Errors
+    /// [`IntrinsicsError`] for a camera that cannot be.
+    pub fn photo(&self, arena: &Arena, at: FloorPose) -> Result<RgbImage, IntrinsicsError> {
+        let t_world_camera = t_world_base(arena, at.into()) * self.t_base_camera();
+        Ok(arena.view(&self.intrinsics()?, &t_world_camera).0)
+    }
+}
+
+/// Pose of a body that stands on an arena's floor.
+#[must_use]
+pub fn t_world_base(arena: &Arena, pose: PlanarPose) -> Transform<World, Base> {
+    let lift = nalgebra::Isometry3::translation(0.0, 0.0, arena.grid().floor_z_m());
+    let on_zero: Transform<World, Base> = pose.to_transform();
+    Transform::new(lift * on_zero.isometry())
+}
+
+/// One task: everything in the world frame, so robots never see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Episode {
+    /// Where it takes place.
+    pub scene: SceneRef,
+    /// The seed it was drawn with.
+    pub seed: u64,
+    /// Where the robot starts.
+    pub start: FloorPose,
+    /// Where the photo was taken.
+    pub goal: FloorPose,
+    /// With what it was taken.
+    pub camera: Viewpoint,
+    /// Geodesic distance from start to goal for this robot, metres.
+    pub shortest_path_m: f64,
+    /// Straight or curved, by NRNS's rule.
+    pub shape: Shape,
+}
+
+/// NRNS's two kinds of episode.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// The way is hardly longer than the straight line, and the headings agree.
+    Straight,
+    /// The rest.
+    Curved,
+}
+
+/// Where the goal may lie.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum GoalPlace {
+    /// Anywhere.
+    #[default]
+    Anywhere,
+    /// In another room than the start; in scenes that do not know their rooms, out of its sight.
+    OtherRoom,
+}
+
+/// What kind of episode is wanted.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct EpisodeSpec {
+    /// Least geodesic distance, metres.
+    pub min_m: f64,
+    /// Greatest geodesic distance, metres.
+    pub max_m: f64,
+    /// Straight, curved, or either.
+    pub shape: Option<Shape>,
+    /// Where the goal may lie.
+    pub goal_place: GoalPlace,
+    /// What takes the photo.
+    pub camera: Viewpoint,
+}
+
+impl Default for EpisodeSpec {
+    /// The benchmark: curved, 3 to 10 m, the robot's own camera.
+    fn default() -> Self {
+        Self {
+            min_m: 3.0,
+            max_m: 10.0,
+            shape: Some(Shape::Curved),
+            goal_place: GoalPlace::Anywhere,
+            camera: Viewpoint::default(),
+        }
+    }
+}
+
+/// Why no episode was drawn.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum DrawError {
+    /// The scene is too small or too simple for what is wanted.
+    #[error("{scene} offers no episode of {min_m} to {max_m} m as asked for, after {tries} tries")]
+    NoneFound {
+        /// The scene's name.
+        scene: String,
+        /// Least distance asked for, metres.
+        min_m: f64,
+        /// Greatest distance asked for, metres.
+        max_m: f64,
+        /// Goals tried.
+        tries: u32,
+    },
+    /// The goal camera cannot be.
+    #[error(transparent)]
+    Camera(#[from] IntrinsicsError),
+}
+
+/// Goals tried before giving up.
+const GOALS_MAX: u32 = 60;
+/// Starts tried for each goal.
+const STARTS_MAX: u32 = 80;
+/// The arrival direction is taken over the last stretch of the path, metres: a follower's last steps.
+const ARRIVAL_M: f64 = 0.5;
+
+/// Draws an episode after NRNS (`generate_test_instances.py`): start and goal uniform over the free space, start heading
+/// uniform, goal heading that in which a follower of the shortest path arrives, the photo taken there. One thing is
+/// added: goal views whose median depth is at most [`GOAL_DEPTH_M_MIN`] are drawn again, because a photo of bare wall
+/// names no place.
+///
+/// Equal arguments give equal episodes on every machine.
+///
+/// # Errors
+/// [`DrawError`] when the scene offers none.
+pub fn draw(arena: &Arena, seed: u64, spec: &EpisodeSpec) -> Result<Episode, DrawError> {
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x6570_6973_6f64_6573);
+    spec.camera.intrinsics()?;
+    for _ in 0..GOALS_MAX {
+        let Some(goal) = random_place(arena, rng) else { continue };
+        let Ok(field) = GeodesicField::to(arena.space(), goal) else { continue };
+        for _ in 0..STARTS_MAX {
+            let candidate = candidate(arena, &field, goal, seed, spec, rng);
+            if let Some(episode) = candidate
+                && shows_something(arena, &episode)?
+            {
+                return Ok(episode);
+            }
+        }
+    }
+    let scene = arena.scene().name.clone();
+    Err(DrawError::NoneFound { scene, min_m: spec.min_m, max_m: spec.max_m, tries: GOALS_MAX })
+}
+
+fn random_place(arena: &Arena, rng: &mut ChaCha8Rng) -> Option<(f64, f64)> {
+    arena.space().nth(rng.random_range(0..arena.space().len() as u64) as usize)
+}
+
+fn candidate(
+    arena: &Arena,
+    field: &GeodesicField<'_>,
+    goal: (f64, f64),
+    seed: u64,
+    spec: &EpisodeSpec,
+    rng: &mut ChaCha8Rng,
+) -> Option<Episode> {
+    let start = random_place(arena, rng)?;
+    let yaw_rad = rng.random_range(-core::f64::consts::PI..core::f64::consts::PI);
+    let shortest_path_m = field.distance_m(start.0, start.1)?;
+    if !(spec.min_m..=spec.max_m).contains(&shortest_path_m) || !is_elsewhere(arena, start, goal, spec.goal_place) {
+        return None;
+    }
+    let goal_yaw_rad = arrival_yaw(&field.path(start.0, start.1)?);
+    let straight_m = libm::hypot(goal.0 - start.0, goal.1 - start.1);
+    let turned = wrap_angle(goal_yaw_rad - yaw_rad).abs() >= CURVED_HEADING_RAD;
+    let curved = shortest_path_m >= CURVED_RATIO * straight_m || turned;
+    let shape = if curved { Shape::Curved } else { Shape::Straight };
+    (spec.shape.is_none_or(|s| s == shape)).then(|| Episode {
+        scene: arena.scene_ref().clone(),
+        seed,
+        start: FloorPose { x_m: start.0, y_m: start.1, yaw_rad },
+        goal: FloorPose { x_m: goal.0, y_m: goal.1, yaw_rad: goal_yaw_rad },
+        camera: spec.camera,
+        shortest_path_m,
+        shape,
+    })
+}
+
+fn is_elsewhere(arena: &Arena, start: (f64, f64), goal: (f64, f64), place: GoalPlace) -> bool {
+    match place {
+        GoalPlace::Anywhere => true,
+        GoalPlace::OtherRoom if arena.has_rooms() => arena.room_at(start.0, start.1) != arena.room_at(goal.0, goal.1),
+        GoalPlace::OtherRoom => !in_sight(arena, start, goal),
+    }
+}
+
+/// True if nothing at the laser's height lies between two points of the world frame, metres.
+#[must_use]
+pub fn in_sight(arena: &Arena, from: (f64, f64), to: (f64, f64)) -> bool {
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    arena.laser().range_m(from, libm::atan2(dy, dx), libm::hypot(dx, dy)).is_none()
+}
+
+/// Direction of the last [`ARRIVAL_M`] of a path, radians.
+fn arrival_yaw(path: &[(f64, f64)]) -> f64 {
+    let Some(&end) = path.last() else { return 0.0 };
+    let mut from = end;
+    for &p in path.iter().rev() {
+        from = p;
+        if libm::hypot(end.0 - p.0, end.1 - p.1) >= ARRIVAL_M {
+            break;
+        }
+    }
+    libm::atan2(end.1 - from.1, end.0 - from.0)
+}
+
+/// A small picture of the goal view is enough to know its median depth.
+fn shows_something(arena: &Arena, episode: &Episode) -> Result<bool, DrawError> {
+    let camera = episode.camera.intrinsics()?.resized(64, 48)?;
+    let t_world_camera = t_world_base(arena, episode.goal.into()) * episode.camera.t_base_camera();
+    let (_, depth) = arena.view(&camera, &t_world_camera);
+    let mut metres: Vec<f32> = depth.data().iter().copied().filter(|d| *d > 0.0).collect();
+    metres.sort_by(f32::total_cmp);
+    Ok(metres.get(metres.len() / 2).is_some_and(|d| f64::from(*d) > GOAL_DEPTH_M_MIN))
+}
