@@ -73,6 +73,8 @@ const RAYS_MAX: usize = 16_384;
 // The direction of travel is judged by the rays within this angle of it, of which this share must have worked.
 const SECTOR_RAD: f64 = 0.5;
 const SECTOR_SHARE: f64 = 0.5;
+// Slowest share of a speed in the slow zone: without it the stop distance is crept up to for seconds.
+const CRAWL_SHARE: f64 = 0.2;
 // Arcs wider than this are straight, metres.
 const RADIUS_STRAIGHT_M: f64 = 100.0;
 
@@ -122,6 +124,7 @@ impl CollisionMonitor {
         if room <= 0.0 {
             (turn_only, Passage::Stopped { ahead_m })
         } else if room < 1.0 {
+            let room = room.max(CRAWL_SHARE);
             let slowed = Velocity { linear_m_s: wanted.linear_m_s * room, angular_rad_s: wanted.angular_rad_s * room };
             (slowed, Passage::Slowed { ahead_m })
         } else {

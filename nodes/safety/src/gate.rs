@@ -200,7 +200,7 @@ impl CommandGate {
         }
     }
 
-    /// Judges a command that arrived at `now`. Only [`Verdict::Accepted`] may move the robot.
+    /// Judges a command that arrived at `now`, which must never decrease. Only [`Verdict::Accepted`] may move the robot.
     pub fn offer(&mut self, now: Stamp, command: &MotionCommand) -> Verdict {
         if self.is_repeat(command) {
             // A repeat in time shows that the holder lives; a recorded one must not keep the lease for it.

@@ -218,3 +218,29 @@ fn a_blind_scanner_stops_a_stream_and_says_so() {
     let blocked = supervisor.take_events().iter().any(|e| matches!(e, Event::Finished(r) if r.outcome.blocked));
     assert!(blocked);
 }
+
+#[test]
+fn a_clock_that_steps_back_brings_nothing_to_life() {
+    let plant = Plant::new(0.0);
+    let mut supervisor = Supervisor::new(config());
+    supervisor.sense(ms(5000), &plant.odometry(ms(5000)), Some(&plant.scan(ms(5000))));
+    let velocity = Motion::Velocity { linear_m_s: 0.4, angular_rad_s: 0.0 };
+    assert_eq!(supervisor.command(ms(5000), &command(1, ms(5000), velocity)), Verdict::Accepted);
+    assert_eq!(supervisor.tick(ms(5300)).linear_m_s, 0.0);
+    assert!(matches!(supervisor.command(ms(4000), &command(2, ms(4000), velocity)), Verdict::Refused(_)));
+    assert_eq!(supervisor.tick(ms(4000)).linear_m_s, 0.0);
+    assert_eq!(supervisor.tick(ms(4020)).linear_m_s, 0.0);
+}
+
+#[test]
+fn odometry_and_scans_from_the_future_do_not_stay_fresh() {
+    let plant = Plant::new(0.0);
+    let mut supervisor = Supervisor::new(config());
+    supervisor.sense(ms(1000), &plant.odometry(ms(99_000)), Some(&plant.scan(ms(99_000))));
+    let mut broken = plant.odometry(ms(1000));
+    broken.linear_m_s = f64::NAN;
+    supervisor.sense(ms(1000), &broken, None);
+    assert_eq!((supervisor.dropped().odometry, supervisor.dropped().scans), (2, 1));
+    let forward = command(1, ms(1000), Motion::Forward { distance_m: 0.5 });
+    assert!(matches!(supervisor.command(ms(1000), &forward), Verdict::Refused(_)));
+}

@@ -46,11 +46,20 @@ pub struct Plant {
     pub lag_s: f64,
     /// An immovable wall across x at this place, metres.
     pub wall_x_m: f64,
+    /// True once it ran into the wall.
+    pub touched: bool,
 }
 
 impl Plant {
     pub fn new(lag_s: f64) -> Self {
-        Self { pose: PlanarPose::default(), linear_m_s: 0.0, angular_rad_s: 0.0, lag_s, wall_x_m: f64::INFINITY }
+        Self {
+            pose: PlanarPose::default(),
+            linear_m_s: 0.0,
+            angular_rad_s: 0.0,
+            lag_s,
+            wall_x_m: f64::INFINITY,
+            touched: false,
+        }
     }
 
     /// Obeys an order for `dt`, in steps of a millisecond.
@@ -63,6 +72,8 @@ impl Plant {
             let x_m = self.pose.x_m + h * self.linear_m_s * self.pose.yaw_rad.cos();
             if x_m + 0.18 < self.wall_x_m {
                 self.pose.x_m = x_m;
+            } else {
+                self.touched = true;
             }
             self.pose.y_m += h * self.linear_m_s * self.pose.yaw_rad.sin();
             self.pose.yaw_rad = homing_core::wrap_angle(self.pose.yaw_rad + h * self.angular_rad_s);
