@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::constants::{HEIGHT_M, LASER_HEIGHT_M, RADIUS_M};
-use crate::flat::{self, Rect};
+use crate::flat::{self, Detail, Rect};
 use crate::gltf_scene::{self, SceneError};
 use crate::laser::LaserSlice;
 use crate::nav_grid::{FreeSpace, NavGrid, NavGridError};
@@ -76,9 +76,17 @@ impl Arena {
     /// # Errors
     /// [`ArenaError`] when the file cannot be read or has no floor.
     pub fn load(scene_ref: &SceneRef, size: BodySize) -> Result<Self, ArenaError> {
+        Self::load_as(scene_ref, size, Detail::Full)
+    }
+
+    /// Generates or reads a scene; a generated one in the detail asked for.
+    ///
+    /// # Errors
+    /// [`ArenaError`] when the file cannot be read or has no floor.
+    pub fn load_as(scene_ref: &SceneRef, size: BodySize, detail: Detail) -> Result<Self, ArenaError> {
         let (scene, rooms) = match scene_ref {
             SceneRef::Flat { seed } => {
-                let flat = flat::generate(*seed);
+                let flat = flat::generate_as(*seed, detail);
                 (flat.scene, flat.rooms.iter().map(|r| r.cell).collect())
             }
             SceneRef::Glb { path } => (gltf_scene::load(path)?, Vec::new()),

@@ -237,12 +237,17 @@ fn candidate(
     (spec.shape.is_none_or(|s| s == shape)).then(|| Episode {
         scene: arena.scene_ref().clone(),
         seed,
-        start: FloorPose { x_m: start.0, y_m: start.1, yaw_rad },
-        goal: FloorPose { x_m: goal.0, y_m: goal.1, yaw_rad: goal_yaw_rad },
+        start: FloorPose { x_m: written(start.0), y_m: written(start.1), yaw_rad: written(yaw_rad) },
+        goal: FloorPose { x_m: written(goal.0), y_m: written(goal.1), yaw_rad: written(goal_yaw_rad) },
         camera: spec.camera,
-        shortest_path_m,
+        shortest_path_m: written(shortest_path_m),
         shape,
     })
+}
+
+/// To the micrometre and microradian: decimals that JSON gives back bit for bit.
+fn written(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
 }
 
 fn is_elsewhere(arena: &Arena, start: (f64, f64), goal: (f64, f64), place: GoalPlace) -> bool {

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::nav_grid::FreeSpace;
 
-/// Around the goal distances are exact up to this many cells, which removes the worst of the first-order scheme's error.
+/// Around the goal distances are exact up to this many cells, where a finite difference errs most.
 const EXACT_CELLS: i64 = 8;
 /// A point beside the free space takes its distance from cells up to this far, in cells.
 const SNAP_CELLS: i64 = 6;
@@ -30,7 +30,7 @@ pub struct GeodesicField<'a> {
 }
 
 impl<'a> GeodesicField<'a> {
-    /// Marches from the goal (x, y in metres, world frame): Sethian 1996, first order.
+    /// Marches from the goal (x, y in metres, world frame): Sethian 1999, second order where its stencil allows.
     ///
     /// # Errors
     /// [`GoalBlocked`] if the robot cannot be there.
@@ -96,7 +96,7 @@ impl<'a> GeodesicField<'a> {
             // The border of the grid is never free, so the four neighbours exist.
             for next in [index - 1, index + 1, index - g.width, index + g.width] {
                 if free[next] && !done[next] {
-                    let metres = self.update(next, g.width, g.resolution_m);
+                    let metres = self.update(next, &done, g.width, g.resolution_m);
                     if metres < self.metres[next] {
                         self.metres[next] = metres;
                         queue.push(Reverse((metres.to_bits(), next as u32)));
@@ -106,13 +106,33 @@ impl<'a> GeodesicField<'a> {
         }
     }
 
-    /// Upwind solution of |grad T| = 1 at a cell from its four neighbours.
-    fn update(&self, index: usize, width: usize, h: f64) -> f64 {
-        let a = self.metres[index - 1].min(self.metres[index + 1]);
-        let b = self.metres[index - width].min(self.metres[index + width]);
-        let (low, high) = (a.min(b), a.max(b));
-        let gap = high - low;
-        if gap >= h { low + h } else { 0.5 * (low + high + libm::sqrt(2.0 * h * h - gap * gap)) }
+    /// Upwind solution of |grad T| = 1 at a cell from its neighbours along both axes.
+    fn update(&self, index: usize, done: &[bool], width: usize, h: f64) -> f64 {
+        let (a, b) = (self.upwind(index, 1, done), self.upwind(index, width, done));
+        let one = |(value, weight): (f64, f64)| value + h / libm::sqrt(weight);
+        let single = one(a).min(one(b));
+        // (T - a)^2 wa + (T - b)^2 wb = h^2, where both axes contribute.
+        let (wa, wb) = (a.1, b.1);
+        let (half_p, q) = (wa * a.0 + wb * b.0, wa * a.0 * a.0 + wb * b.0 * b.0 - h * h);
+        let discriminant = half_p * half_p - (wa + wb) * q;
+        if !discriminant.is_finite() || discriminant < 0.0 {
+            return single;
+        }
+        let both = (half_p + libm::sqrt(discriminant)) / (wa + wb);
+        if both >= a.0.max(b.0) { both } else { single }
+    }
+
+    /// The nearer neighbour along an axis as (value, weight) of its squared difference; of second order where the cell
+    /// behind it is settled too.
+    fn upwind(&self, index: usize, stride: usize, done: &[bool]) -> (f64, f64) {
+        let (back, front) = (index - stride, index + stride);
+        let (near, outward) = if self.metres[back] <= self.metres[front] { (back, -1) } else { (front, 1) };
+        let t1 = self.metres[near];
+        let far = near.checked_add_signed(outward * stride as isize).filter(|f| *f < done.len() && done[*f]);
+        match far.map(|f| self.metres[f]) {
+            Some(t2) if done[near] && t2 <= t1 => ((4.0 * t1 - t2) / 3.0, 2.25),
+            _ => (t1, 1.0),
+        }
     }
 
     fn around_goal(&self) -> Vec<(usize, f64)> {

@@ -5,6 +5,7 @@ pub mod body;
 pub mod constants;
 pub mod episode;
 pub mod flat;
+pub mod follower;
 pub mod geodesic;
 pub mod gltf_scene;
 pub mod laser;

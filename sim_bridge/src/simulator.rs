@@ -160,6 +160,12 @@ impl Simulator {
         self.body.pose
     }
 
+    /// The body as it stands. Ground truth.
+    #[must_use]
+    pub fn body_truth(&self) -> &Body {
+        &self.body
+    }
+
     /// The start pose in the world frame. Ground truth.
     #[must_use]
     pub fn t_world_odom_truth(&self) -> Transform<World, Odom> {

@@ -64,6 +64,15 @@ pub(super) enum Contact {
     Ghost,
 }
 
+/// How much of a flat is made.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Shapes and textures.
+    Full,
+    /// Shapes only, in plain colours: for whoever drives but never looks. Geometry equals that of [`Detail::Full`].
+    Shape,
+}
+
 /// A scene under construction.
 #[derive(Default)]
 pub(super) struct SceneBuilder {
@@ -95,9 +104,13 @@ impl SceneBuilder {
     }
 
     /// Draws the textures, each once and side by side, and hands the scene over.
-    pub fn finish(self, name: String) -> Scene {
+    pub fn finish(self, name: String, detail: Detail) -> Scene {
         let mut drawn: Vec<(Surface, u64)> = Vec::new();
-        let materials = self.looks.iter().map(|look| material_of(look, &mut drawn)).collect();
+        let mut materials: Vec<Material> = self.looks.iter().map(|look| material_of(look, &mut drawn)).collect();
+        if detail == Detail::Shape {
+            drawn.clear();
+            materials.iter_mut().for_each(|m| m.texture = None);
+        }
         let textures = drawn.par_iter().map(|&(surface, seed)| textures::draw(surface, seed)).collect();
         Scene { name, meshes: self.meshes, materials, textures, lamps: self.lamps }
     }

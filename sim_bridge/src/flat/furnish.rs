@@ -43,7 +43,7 @@ pub(super) struct Furnishing<'a> {
 /// Depth kept free before a door, metres.
 const DOOR_ZONE_M: f64 = 0.75;
 /// Attempts for each piece.
-const TRIES: usize = 14;
+const TRIES: usize = 30;
 
 impl<'a> Furnishing<'a> {
     /// An empty room with its doors.
@@ -185,7 +185,7 @@ impl<'a> Furnishing<'a> {
         let (width, _, height) = piece.size();
         let span = (along - 0.5 * width, along + 0.5 * width);
         let index = Side::ALL.iter().position(|s| *s == side)?;
-        let hidden = |s: &Span| s.along.0 < span.1 && span.0 < s.along.1 && s.height.0 < height;
+        let hidden = |s: &Span| s.along.0 < span.1 && span.0 < s.along.1 && s.height.0 < height - 0.12;
         if self.spans[index].iter().any(hidden) {
             return None;
         }

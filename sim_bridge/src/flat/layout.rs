@@ -98,7 +98,7 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// Draws a plan of 9 to 14 m by 8 to 11.5 m in which every room can be reached.
+    /// Draws a plan of 9 to 13.5 m by 8 to 10.8 m in which every room can be reached.
     pub fn draw(rng: &mut ChaCha8Rng) -> Self {
         loop {
             let plan = Self::draw_any(rng);
@@ -109,7 +109,7 @@ impl Plan {
     }
 
     fn draw_any(rng: &mut ChaCha8Rng) -> Self {
-        let outer = Rect::new(0.0, 0.0, rng.random_range(9.0..14.0), rng.random_range(8.0..11.5));
+        let outer = Rect::new(0.0, 0.0, rng.random_range(9.0..13.5), rng.random_range(8.0..10.8));
         let (cells, corridors) = if rng.random_bool(0.6) { along_a_corridor(outer, rng) } else { split(outer, rng) };
         let mut rooms: Vec<Room> = cells
             .iter()
@@ -183,7 +183,7 @@ fn slice(band: Rect, n: u32, cells: &mut Vec<Rect>, rng: &mut ChaCha8Rng) {
 
 /// Recursive halving of the largest room.
 fn split(outer: Rect, rng: &mut ChaCha8Rng) -> (Vec<Rect>, usize) {
-    let target = rng.random_range(4..=6);
+    let target = rng.random_range(5..=7);
     let mut cells = vec![outer];
     while cells.len() < target {
         let Some(largest) = (0..cells.len()).max_by(|&a, &b| cells[a].area().total_cmp(&cells[b].area())) else {
@@ -295,7 +295,7 @@ mod tests {
             let plan = Plan::draw(&mut ChaCha8Rng::seed_from_u64(seed));
             assert!((3..=8).contains(&plan.rooms.len()), "seed {seed}: {} rooms", plan.rooms.len());
             let area: f64 = plan.rooms.iter().map(|r| r.cell.area()).sum();
-            assert!((72.0..=168.0).contains(&area), "seed {seed}: {area} square metres");
+            assert!((72.0..=146.0).contains(&area), "seed {seed}: {area} square metres");
             for (i, a) in plan.rooms.iter().enumerate() {
                 assert!(a.floor.width().min(a.floor.depth()) > 1.1, "seed {seed}: {a:?}");
                 assert!(plan.rooms.iter().skip(i + 1).all(|b| !a.cell.grown(-1e-6).overlaps(&b.cell)));

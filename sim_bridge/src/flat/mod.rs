@@ -1,6 +1,6 @@
 //! Procedural flats: from a seed to rooms, doors, furniture and the scene they make.
 //!
-//! A flat is a rectangle of 9 to 14 m by 8 to 11.5 m, divided into 3 to 8 rooms by walls 0.12 m thick and 2.5 to 2.7 m
+//! A flat is a rectangle of 9 to 13.5 m by 8 to 10.8 m, divided into 3 to 8 rooms by walls 0.12 m thick and 2.5 to 2.7 m
 //! high. Its rooms choose their looks from one small stock, so that the same chair, poster or floor turns up in several of
 //! them. Furniture leaves a way of at least 0.54 m between all doors of a room.
 
@@ -17,6 +17,7 @@ mod style;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+pub use builder::Detail;
 pub use geometry::{Rect, Side};
 pub use layout::{Axis, Door, Room, RoomKind, WALL_M};
 
@@ -53,6 +54,12 @@ impl Flat {
 /// Generates the flat of a seed: equal seeds give equal flats, bit for bit, on every machine.
 #[must_use]
 pub fn generate(seed: u64) -> Flat {
+    generate_as(seed, Detail::Full)
+}
+
+/// Generates the flat of a seed in the detail asked for.
+#[must_use]
+pub fn generate_as(seed: u64, detail: Detail) -> Flat {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let plan = Plan::draw(rng);
     let height_m = rng.random_range(2.5..2.7);
@@ -64,7 +71,7 @@ pub fn generate(seed: u64) -> Flat {
         shell::build_room(scene, room, walls, &style, &look, height_m, rng);
         furnish_room(scene, room, walls, &style, &look, rng);
     }
-    let scene = core::mem::take(scene).finish(format!("flat seed {seed}"));
+    let scene = core::mem::take(scene).finish(format!("flat seed {seed}"), detail);
     Flat { seed, scene, rooms: plan.rooms, doors: plan.doors, height_m }
 }
 
@@ -133,7 +140,7 @@ mod tests {
     #[test]
     fn a_flat_has_a_sensible_number_of_finite_triangles() {
         for seed in 0..20 {
-            let scene = generate(seed).scene;
+            let scene = generate_as(seed, Detail::Shape).scene;
             let n: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
             assert!((6_000..=40_000).contains(&n), "seed {seed}: {n} triangles");
             for mesh in &scene.meshes {

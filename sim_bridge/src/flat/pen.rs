@@ -14,6 +14,8 @@ pub(super) type Vec3 = [f64; 3];
 pub(super) enum Mapping {
     /// The surface repeats every so many metres, starting at the given metres (u, v).
     Metres(f64, f64),
+    /// The same turned by a quarter: what runs along u runs upwards.
+    MetresUp(f64, f64),
     /// The picture covers the face once.
     Picture,
 }
@@ -64,6 +66,10 @@ impl<'a> Pen<'a> {
                 let (u0, u1, v0, v1) = (u / side, (u + w) / side, v / side, (v + h) / side);
                 [[u0, v1], [u1, v1], [u1, v0], [u0, v0]]
             }
+            Mapping::MetresUp(u, v) => {
+                let (u0, u1, v0, v1) = (u / side, (u + h) / side, v / side, (v + w) / side);
+                [[u0, v0], [u0, v1], [u1, v1], [u1, v0]]
+            }
         };
         let vertices: Vec<Vertex> = (0..4).map(|i| self.vertex(corners[i], n, uvs[i])).collect();
         push_fan(self.scene.mesh(look, self.contact), &vertices);
@@ -74,9 +80,9 @@ impl<'a> Pen<'a> {
     pub fn hexahedron(&mut self, look: &Look, bottom: [Vec3; 4], top: [Vec3; 4]) {
         for i in 0..4 {
             let j = (i + 1) % 4;
-            self.face(look, [bottom[i], bottom[j], top[j], top[i]], Mapping::Metres(bottom[i][0] + bottom[i][1], 0.0));
+            self.face(look, [bottom[i], bottom[j], top[j], top[i]], along_grain(&[bottom[i], bottom[j], top[i]]));
         }
-        self.face(look, top, Mapping::Metres(top[0][0], top[0][1]));
+        self.face(look, top, along_grain(&[top[0], top[1], top[3]]));
         if bottom[0][2] > 0.005 {
             self.face(look, [bottom[3], bottom[2], bottom[1], bottom[0]], Mapping::Metres(0.0, 0.0));
         }
@@ -171,6 +177,13 @@ impl<'a> Pen<'a> {
             quads.iter().for_each(|q| push_fan(mesh, q));
         }
     }
+}
+
+/// Wood is cut so that its grain (u) runs along the longer edge. Starts where the face is, so that no two boards repeat.
+fn along_grain([origin, right, up]: &[Vec3; 3]) -> Mapping {
+    let (u, v) = (1.37 * origin[0] + 0.61 * origin[2], 0.83 * origin[1] + 1.19 * origin[2]);
+    let (w, h) = (norm(sub(*right, *origin)), norm(sub(*up, *origin)));
+    if h > w { Mapping::MetresUp(u, v) } else { Mapping::Metres(u, v) }
 }
 
 /// A point of the unit cube's surface moved onto a box with rounded edges, and the normal there. The outer steps of the

@@ -108,7 +108,7 @@ fn windows(room: &Room, length: f64, height_m: f64, rng: &mut ChaCha8Rng) -> Vec
     let (width, sill) = match room.kind {
         RoomKind::Bath => (0.7, 1.3),
         RoomKind::Kitchen => (1.0, 1.15),
-        RoomKind::Living => (rng.random_range(1.3..1.9), 0.6),
+        RoomKind::Living => (rng.random_range(1.3..1.9), 0.75),
         _ => (rng.random_range(1.0..1.4), 0.85),
     };
     let n = (((length - 0.4) / (width + 1.1)).floor() as usize).min(3);
