@@ -303,16 +303,26 @@ impl Supervisor {
         Some(Wish { velocity, until: Stamp(u64::MAX), commander: Some((id.session, id.sequence)), cause })
     }
 
-    // Ramps towards the wish within the limits, then asks the monitor. To stand still no ramp is kept: braking is the
-    // body's own, and as hard as it can.
+    // Asks the monitor what part of the wish is safe, and ramps towards that within the limits; a monitor that slows down
+    // is obeyed at once. While ramping the path differs from the wish's, so what comes out is asked about again. To stand
+    // still no ramp is kept: braking is the body's own, and as hard as it can.
     fn shape(&self, now: Stamp, dt: Duration, wanted: Velocity) -> (Velocity, Passage) {
+        let limits = &self.config.gate.limits;
+        let wanted = limits.clamp(wanted).unwrap_or(Velocity::ZERO);
         if wanted.is_zero() {
             return (Velocity::ZERO, Passage::Free);
         }
-        let ramped = self.config.gate.limits.approach(self.last_order, wanted, dt);
-        match &self.monitor {
-            Some(monitor) => monitor.limit(now, ramped),
-            None => (ramped, Passage::Free),
+        let Some(monitor) = &self.monitor else {
+            return (limits.approach(self.last_order, wanted, dt), Passage::Free);
+        };
+        let (allowed, passage) = monitor.limit(now, wanted);
+        let mut ramped = limits.approach(self.last_order, allowed, dt);
+        if passage != Passage::Free {
+            ramped.linear_m_s = ramped.linear_m_s.clamp(-allowed.linear_m_s.abs(), allowed.linear_m_s.abs());
+        }
+        match monitor.limit(now, ramped) {
+            (stopped, again @ (Passage::Stopped { .. } | Passage::Blind)) => (stopped, again),
+            _ => (ramped, passage),
         }
     }
 

@@ -244,3 +244,25 @@ fn odometry_and_scans_from_the_future_do_not_stay_fresh() {
     let forward = command(1, ms(1000), Motion::Forward { distance_m: 0.5 });
     assert!(matches!(supervisor.command(ms(1000), &forward), Verdict::Refused(_)));
 }
+
+#[test]
+fn the_slow_zone_slows_and_does_not_creep() {
+    let mut plant = Plant { wall_x_m: 1.0, ..Plant::new(0.05) };
+    let mut supervisor = Supervisor::new(config());
+    let mut speeds = Vec::new();
+    for t in (1000..7000).step_by(20) {
+        supervisor.sense(ms(t), &plant.odometry(ms(t)), Some(&plant.scan(ms(t))));
+        let motion = Motion::Velocity { linear_m_s: 0.5, angular_rad_s: 0.0 };
+        assert_eq!(supervisor.command(ms(t), &command(t, ms(t), motion)), Verdict::Accepted);
+        let order = supervisor.tick(ms(t));
+        plant.drive(&order, TICK);
+        speeds.push((plant.pose.x_m, order.linear_m_s));
+    }
+    let rest_m = 1.0 - 0.18 - plant.pose.x_m;
+    assert!((0.08..0.13).contains(&rest_m), "stands {rest_m} m before the wall");
+    // Hull 0.27 m from the wall: half of the slow zone is left, less the 2 cm of margin.
+    let half = speeds.iter().find(|(x_m, _)| 1.0 - 0.18 - x_m < 0.27).unwrap().1;
+    assert!((half - 0.25).abs() < 0.04, "half the speed half way: {half}");
+    let last = speeds.iter().rposition(|&(_, v)| v > 0.0).unwrap();
+    assert!(last < 200, "stands after {} s", last as f64 * 0.02);
+}

@@ -96,11 +96,12 @@ impl Commander {
 
 fn motion(rng: &mut impl Rng) -> Motion {
     let wild = [f64::NAN, f64::INFINITY, -1e9, 0.51, -0.0, 1e-300];
-    let mut number = |bound: f64| match rng.random_range(0..100) {
+    // More forwards than backwards, so that walls are met.
+    let mut number = |least: f64, most: f64| match rng.random_range(0..100) {
         0..4 => wild[rng.random_range(0..wild.len())],
-        _ => rng.random_range(-bound..=bound),
+        _ => rng.random_range(least..=most),
     };
-    let (a, b) = (number(0.5), number(1.5));
+    let (a, b) = (number(-0.2, 0.5), number(-1.0, 1.0));
     match rng.random_range(0..100) {
         0..90 => Motion::Velocity { linear_m_s: a, angular_rad_s: b },
         90..94 => Motion::Forward { distance_m: a },
@@ -183,7 +184,7 @@ fn simulate(seed: u64) -> (u64, Duration, GateCounters) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let quality = Quality { loss_percent: rng.random_range(0..40), delay_ms_max: rng.random_range(0..400) };
     let mut supervisor = Supervisor::new(config());
-    let mut plant = Plant { wall_x_m: rng.random_range(0.5..5.0), ..Plant::new(0.05) };
+    let mut plant = Plant { wall_x_m: rng.random_range(0.3..1.5), ..Plant::new(0.05) };
     let mut commanders = [Commander::new(1), Commander::new(2)];
     let (mut link, mut books) = (Link::default(), Books::default());
     let mut order = supervisor.tick(ms(1000));
