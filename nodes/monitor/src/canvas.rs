@@ -10,7 +10,6 @@ use crate::palette::Rgb;
 pub(crate) enum Align {
     Left,
     Centre,
-    Right,
 }
 
 /// How text looks.
@@ -175,7 +174,6 @@ impl Canvas {
         let shift = match align {
             Align::Left => 0.0,
             Align::Centre => 0.5,
-            Align::Right => 1.0,
         };
         let left = x - shift * width * unit;
         for stroke in strokes {

@@ -5,8 +5,6 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _, ImageResult};
 
-use crate::palette::{Rgb, dark};
-
 /// JPEG of a colour image.
 pub(crate) fn jpeg(image: &RgbImage, quality: u8) -> ImageResult<Vec<u8>> {
     let mut bytes = Vec::with_capacity(1 << 17);
@@ -38,16 +36,30 @@ pub(crate) fn depth_png(depth: &DepthImage) -> ImageResult<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The known part of a map as an image.
+/// The known part of a map as an image of classes.
 pub(crate) struct MapImage {
-    /// PNG, the row of largest y on top.
-    pub(crate) png: Vec<u8>,
+    /// Columns and rows.
+    pub(crate) size: [u32; 2],
+    /// A [`Cell`] as a byte for each pixel, row-major, the row of largest y on top.
+    pub(crate) classes: Vec<u8>,
     /// Left edge, metres.
     pub(crate) left_m: f64,
     /// Upper edge: the largest y, metres.
     pub(crate) top_m: f64,
     /// Side of a pixel, metres.
     pub(crate) resolution_m: f64,
+}
+
+impl MapImage {
+    /// Lower edge, metres.
+    pub(crate) fn bottom_m(&self) -> f64 {
+        self.top_m - f64::from(self.size[1]) * self.resolution_m
+    }
+
+    /// From left to right edge, metres.
+    pub(crate) fn width_m(&self) -> f64 {
+        f64::from(self.size[0]) * self.resolution_m
+    }
 }
 
 /// Smallest box of cells (first column, first row, last column, last row) that holds every known cell and `margin` cells
@@ -68,29 +80,18 @@ pub(crate) fn known_box(map: &OccupancyGrid, margin: usize) -> Option<[usize; 4]
     })
 }
 
-/// Draws the known part of a map, north (y) up.
-pub(crate) fn map_image(map: &OccupancyGrid) -> Option<ImageResult<MapImage>> {
-    let margin = (0.5 / map.geometry.resolution_m).ceil() as usize;
-    let [c0, r0, c1, r1] = known_box(map, margin)?;
-    let colour = |cell: Cell| -> Rgb {
-        match cell {
-            Cell::Unknown => dark::UNKNOWN,
-            Cell::Free => dark::FREE,
-            Cell::Occupied => dark::OCCUPIED,
-        }
-    };
-    let pixels: Vec<u8> = (r0..=r1).rev().flat_map(|r| (c0..=c1).flat_map(move |c| colour(map.at(c, r)))).collect();
-    let (width, height) = ((c1 - c0 + 1) as u32, (r1 - r0 + 1) as u32);
-    let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter);
-    let encoded = encoder.write_image(&pixels, width, height, ExtendedColorType::Rgb8);
+/// The known part of a map and half a metre around it, y up; `None` if nothing is known.
+pub(crate) fn map_image(map: &OccupancyGrid) -> Option<MapImage> {
     let resolution_m = map.geometry.resolution_m;
-    Some(encoded.map(|()| MapImage {
-        png: bytes,
+    let margin = (0.5 / resolution_m).ceil() as usize;
+    let [c0, r0, c1, r1] = known_box(map, margin)?;
+    Some(MapImage {
+        size: [(c1 - c0 + 1) as u32, (r1 - r0 + 1) as u32],
+        classes: (r0..=r1).rev().flat_map(|r| (c0..=c1).map(move |c| map.at(c, r) as u8)).collect(),
         left_m: map.geometry.origin_x_m + c0 as f64 * resolution_m,
         top_m: map.geometry.origin_y_m + (r1 + 1) as f64 * resolution_m,
         resolution_m,
-    }))
+    })
 }
 
 #[cfg(test)]
@@ -114,16 +115,16 @@ mod tests {
             let i = map.geometry.index(c, r);
             map.cells[i] = cell;
         }
-        let image = map_image(&map).unwrap().unwrap();
-        let pixels = image::load_from_memory(&image.png).unwrap().into_rgb8();
+        let image = map_image(&map).unwrap();
         let at = |x: f64, y: f64| {
             let (c, r) = ((x - image.left_m) / image.resolution_m, (image.top_m - y) / image.resolution_m);
-            pixels.get_pixel(c as u32, r as u32).0
+            image.classes[r as usize * image.size[0] as usize + c as usize]
         };
-        assert_eq!(at(1.05, 2.05), dark::OCCUPIED);
-        assert_eq!(at(-1.05, -2.05), dark::FREE);
-        assert_eq!(at(0.0, 0.0), dark::UNKNOWN);
-        assert!(pixels.width() < 40 && pixels.height() < 60);
+        assert_eq!(at(1.05, 2.05), Cell::Occupied as u8);
+        assert_eq!(at(-1.05, -2.05), Cell::Free as u8);
+        assert_eq!(at(0.0, 0.0), Cell::Unknown as u8);
+        assert!(image.size[0] < 40 && image.size[1] < 60);
+        assert!((image.bottom_m() - -2.6).abs() < 0.06, "{}", image.bottom_m());
     }
 
     #[test]

@@ -24,6 +24,7 @@ pub(crate) const TARGET: &str = "map/target";
 pub(crate) const GOAL_TRUE: &str = "map/true goal";
 pub(crate) const GOAL_TRUE_HEADING: &str = "map/true goal/heading";
 pub(crate) const GOAL_ELLIPSE: &str = "map/goal estimate";
+pub(crate) const GOAL_CENTRE: &str = "map/goal estimate/centre";
 pub(crate) const GOAL_HEADING: &str = "map/goal estimate/heading";
 pub(crate) const GOAL_BEARING: &str = "map/goal bearing";
 pub(crate) const ROBOT_TRUE: &str = "map/true robot";
@@ -31,13 +32,8 @@ pub(crate) const ROBOT: &str = "map/robot";
 pub(crate) const ROBOT_HEADING: &str = "map/robot/heading";
 pub(crate) const LEGEND: &str = "map/legend";
 
-/// Lanes of the state timeline.
-pub(crate) const STATE: &str = "state";
-pub(crate) const MODE: &str = "state/mode";
-pub(crate) const SIGHTING: &str = "state/goal";
-pub(crate) const ACTION: &str = "state/action";
-
 /// Plots.
+pub(crate) const MODE: &str = "mode";
 pub(crate) const LATENCY: &str = "latency";
 pub(crate) const COUNTS: &str = "counts";
 pub(crate) const MATCH_COUNT: &str = "counts/matches";

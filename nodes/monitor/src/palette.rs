@@ -39,7 +39,6 @@ pub(crate) mod light {
     pub(crate) const START: Rgb = [71, 80, 98];
     pub(crate) const TEXT: Rgb = [28, 33, 43];
     pub(crate) const FAINT: Rgb = [112, 120, 136];
-    pub(crate) const RULE: Rgb = [214, 218, 226];
     pub(crate) const GOOD: Rgb = [22, 140, 78];
     pub(crate) const BAD: Rgb = [204, 48, 48];
 }

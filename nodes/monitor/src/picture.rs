@@ -58,9 +58,9 @@ pub enum PictureError {
 
 /// Size of the picture, pixels.
 const SIZE: (usize, usize) = (1600, 900);
-const MAP_PANEL: Rect = Rect { x: 40.0, y: 156.0, width: 1050.0, height: 708.0 };
-const GOAL_PANEL: Rect = Rect { x: 1120.0, y: 156.0, width: 440.0, height: 330.0 };
-const VIEW_PANEL: Rect = Rect { x: 1120.0, y: 534.0, width: 440.0, height: 330.0 };
+const MAP_PANEL: Rect = Rect { x: 40.0, y: 176.0, width: 1050.0, height: 688.0 };
+const GOAL_PANEL: Rect = Rect { x: 1120.0, y: 176.0, width: 440.0, height: 320.0 };
+const VIEW_PANEL: Rect = Rect { x: 1120.0, y: 544.0, width: 440.0, height: 320.0 };
 
 /// Draws an episode on 1600 x 900 pixels: headline and facts, the map with its paths, and the two views.
 #[must_use]

@@ -215,6 +215,7 @@ impl Recorder {
     fn spawn_drain(&self, mut scene: Scene) -> Result<(), RecorderError> {
         let (queue, shown, drained) = (self.queue.clone(), self.shown.clone(), self.drained.clone());
         let drain = move || {
+            scene.begin();
             while let Some(update) = queue.pop() {
                 scene.show(update);
                 shown.fetch_add(1, Ordering::Relaxed);

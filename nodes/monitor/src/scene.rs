@@ -1,6 +1,6 @@
 //! Turns updates into what the viewer shows. Runs in the recorder's thread only.
 
-mod camera;
+pub(crate) mod camera;
 mod map;
 mod state;
 
@@ -28,16 +28,21 @@ pub(crate) struct Scene {
 impl Scene {
     pub(crate) fn new(stream: RecordingStream, config: &RecorderConfig) -> Self {
         let log = Logger { stream };
-        let mut clock = Clock::default();
-        clock.set(&log, Stamp::default());
         let image_interval = Duration::from_secs_f64(1.0 / config.image_rate_hz_max.clamp(0.1, 1000.0));
         Self {
             camera: CameraScene::new(&log, image_interval, config.jpeg_quality),
             map: MapScene::new(&log, image_interval, config.robot_radius_m),
             state: StateScene::new(&log),
             log,
-            clock,
+            clock: Clock::default(),
         }
+    }
+
+    /// Puts what comes before the first stamp to the beginning of the timelines. To be called in the thread that shows:
+    /// the SDK keeps its time per thread, and what is logged without one holds for all times and hides what follows.
+    pub(crate) fn begin(&mut self) {
+        self.clock.set(&self.log, Stamp::default());
+        self.state.begin(&self.log);
     }
 
     pub(crate) fn show(&mut self, update: Update) {
@@ -109,10 +114,6 @@ impl Logger {
         }
     }
 
-    fn clear(&self, entity: &str) {
-        self.show(entity, &rerun::Clear::recursive());
-    }
-
     fn markdown(&self, text: &str) {
         self.show(entities::SUMMARY, &TextDocument::from_markdown(text));
     }
@@ -124,7 +125,8 @@ impl Logger {
             Level::Warn => TextLogLevel::WARN,
             Level::Error => TextLogLevel::ERROR,
         };
-        self.show(&format!("{}/{source}", entities::LOG), &TextLog::new(text).with_level(level));
+        let line = TextLog::new(format!("{source}: {text}")).with_level(level);
+        self.show(&format!("{}/{source}", entities::LOG), &line);
     }
 }
 

@@ -72,7 +72,8 @@ impl View {
     }
 
     fn path(&self, path_m: &[(f64, f64)]) -> Vec<(f64, f64)> {
-        path_m.iter().map(|&(x, y)| self.at(x, y)).collect()
+        let finite = path_m.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+        finite.map(|&(x, y)| self.at(x, y)).collect()
     }
 
     fn metres(&self, x_px: f64, y_px: f64) -> (f64, f64) {

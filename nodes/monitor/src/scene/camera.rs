@@ -18,8 +18,13 @@ const FRAMES_KEPT: usize = 16;
 const ESTIMATES_FLOW: Duration = Duration::from_secs(1);
 /// More lines than this are a curtain, not a picture.
 const LINES_MAX: usize = 70;
-/// Between the images, pixels of the camera image.
-const GAP_PX: f32 = 12.0;
+/// Each image is fitted into a cell of this size, whatever its own, so that the view's bounds hold for every camera.
+const CELL: (f32, f32) = (640.0, 480.0);
+/// Between the cells.
+const GAP: f32 = 12.0;
+
+/// What the view shows of the space the images lie in: x and y ranges.
+pub(crate) const BOUNDS: ([f64; 2], [f64; 2]) = ([-6.0, 2.0 * 640.0 + 12.0 + 6.0], [-44.0, 486.0]);
 
 pub(super) struct CameraScene {
     gate: Gate,
@@ -46,12 +51,11 @@ impl CameraScene {
     pub(super) fn goal(&mut self, log: &Logger, photo: GoalPhoto) {
         let size = self.laid_out.take().unwrap_or((640, 480));
         self.goal = Some(photo);
-        log.clear(entities::MATCH_LINES);
-        log.clear(entities::MATCH_POINTS);
         if let Some(photo) = &self.goal {
             show_jpeg(log, entities::GOAL_PHOTO, &photo.rgb, self.jpeg_quality);
         }
         self.lay_out(log, size);
+        self.show_matches(log, &[]);
     }
 
     pub(super) fn frame(&mut self, log: &Logger, clock: &mut Clock, frame: Arc<RgbdFrame>) {
@@ -86,50 +90,65 @@ impl CameraScene {
         self.lay_out(log, (frame.rgb.width(), frame.rgb.height()));
     }
 
-    /// Puts the goal photo to the right of the camera image, scaled to its height.
+    /// Puts camera image and goal photo side by side.
     fn lay_out(&mut self, log: &Logger, camera: (u32, u32)) {
         if self.laid_out == Some(camera) {
             return;
         }
         self.laid_out = Some(camera);
-        let mut captions = vec![([0.5 * camera.0 as f32, -20.0], "what the robot sees")];
-        if let Some((offset, scale)) = self.goal_placement() {
-            let place = Transform3D::from_translation_scale([offset, 0.0, 0.0], [scale, scale, 1.0]);
-            log.show(entities::GOAL_PHOTO, &place);
-            let width = self.goal.as_ref().map_or(0.0, |goal| goal.rgb.width() as f32 * scale);
-            captions.push(([offset + 0.5 * width, -20.0], "the photo to drive to"));
+        log.show(entities::CAMERA, &Placement::in_cell(0, camera).transform());
+        if let Some(goal) = &self.goal {
+            let size = (goal.rgb.width(), goal.rgb.height());
+            log.show(entities::GOAL_PHOTO, &Placement::in_cell(1, size).transform());
         }
-        let labels = Points2D::new(captions.iter().map(|(at, _)| *at))
+        let captions = [(0.5 * CELL.0, "what the robot sees"), (1.5 * CELL.0 + GAP, "the photo to drive to")];
+        let labels = Points2D::new(captions.map(|(x, _)| [x, -24.0]))
             .with_radii([rerun::Radius::ZERO])
             .with_colors([rgb(dark::TEXT)])
-            .with_labels(captions.iter().map(|(_, text)| *text))
+            .with_labels(captions.map(|(_, text)| text))
             .with_show_labels(true);
         log.show(entities::CAPTIONS, &labels);
     }
 
-    /// Offset (camera pixels) and scale of the goal photo.
-    fn goal_placement(&self) -> Option<(f32, f32)> {
-        let (width, height) = self.laid_out?;
-        let goal = self.goal.as_ref()?;
-        Some((width as f32 + GAP_PX, height as f32 / goal.rgb.height() as f32))
-    }
-
     fn show_matches(&self, log: &Logger, matches: &[MatchedPoint]) {
-        let Some((offset, scale)) = self.goal_placement() else { return };
-        let height = self.laid_out.map_or(1.0, |(_, height)| f64::from(height));
+        let (Some(camera), Some(goal)) = (self.laid_out, &self.goal) else { return };
+        let query = Placement::in_cell(0, camera);
+        let photo = Placement::in_cell(1, (goal.rgb.width(), goal.rgb.height()));
         let stride = matches.len().div_ceil(LINES_MAX).max(1);
-        // Pixel centres are whole numbers to us and halves to the viewer.
-        let ends = |m: &MatchedPoint| {
-            let query = [m.query_px.0 + 0.5, m.query_px.1 + 0.5];
-            [query, [offset + (m.goal_px.0 + 0.5) * scale, (m.goal_px.1 + 0.5) * scale]]
-        };
+        let ends = |m: &MatchedPoint| [query.at(m.query_px), photo.at(m.goal_px)];
         let shown: Vec<_> = matches.iter().step_by(stride).map(ends).collect();
-        let colours: Vec<_> = shown.iter().map(|[query, _]| rgb(ramp(f64::from(query[1]) / height))).collect();
+        let colours: Vec<_> = shown.iter().map(|[query, _]| rgb(ramp(f64::from(query[1] / CELL.1)))).collect();
         let lines = LineStrips2D::new(shown.iter().copied()).with_radii([points(0.75)]).with_colors(colours);
         log.show(entities::MATCH_LINES, &lines.with_draw_order(20.0));
         let all = matches.iter().flat_map(ends);
         let dots = Points2D::new(all).with_radii([points(1.6)]).with_colors([rgb(dark::TEXT)]);
         log.show(entities::MATCH_POINTS, &dots.with_draw_order(21.0));
+    }
+}
+
+/// Where an image lies: its upper left corner and the side of a pixel, units of a cell.
+struct Placement {
+    left: f32,
+    top: f32,
+    scale: f32,
+}
+
+impl Placement {
+    /// In the middle of a cell, as large as fits.
+    fn in_cell(column: u8, (width, height): (u32, u32)) -> Self {
+        let (width, height) = (width as f32, height as f32);
+        let scale = (CELL.0 / width).min(CELL.1 / height);
+        let left = f32::from(column) * (CELL.0 + GAP) + 0.5 * (CELL.0 - width * scale);
+        Self { left, top: 0.5 * (CELL.1 - height * scale), scale }
+    }
+
+    fn transform(&self) -> Transform3D {
+        Transform3D::from_translation_scale([self.left, self.top, 0.0], [self.scale, self.scale, 1.0])
+    }
+
+    /// Of a pixel of the image. Pixel centres are whole numbers to us and halves to the viewer.
+    fn at(&self, (x_px, y_px): (f32, f32)) -> [f32; 2] {
+        [self.left + (x_px + 0.5) * self.scale, self.top + (y_px + 0.5) * self.scale]
     }
 }
 
@@ -152,5 +171,20 @@ fn show_depth(log: &Logger, depth: &DepthImage) {
             log.show(entities::DEPTH, &image);
         }
         Err(error) => tracing::warn!(%error, "depth not shown"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_of_any_shape_stays_in_its_cell() {
+        for size in [(640, 480), (600, 480), (1920, 1080), (480, 640), (1, 1)] {
+            let place = Placement::in_cell(1, size);
+            let corner = place.at((size.0 as f32 - 0.5, size.1 as f32 - 0.5));
+            assert!(place.left >= CELL.0 + GAP - 0.01 && place.top >= -0.01, "{size:?}");
+            assert!(corner[0] <= 2.0 * CELL.0 + GAP + 0.01 && corner[1] <= CELL.1 + 0.01, "{size:?}");
+        }
     }
 }

@@ -1,11 +1,14 @@
 //! The map from above: grid, paths, robot, frontiers, goal.
 
+mod legend;
+
 use std::time::Duration;
 
-use homing_core::{GoalHypothesis, LaserScan, NavigationState, OccupancyGrid, PlanarPose, Sighting};
+use homing_core::{Cell, GoalHypothesis, LaserScan, NavigationState, OccupancyGrid, PlanarPose, Sighting};
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
-use rerun::components::MediaType;
-use rerun::{Arrows2D, EncodedImage, LineStrips2D, Points2D, Transform3D};
+use rerun::components::ImageFormat;
+use rerun::datatypes::{ChannelDatatype, ClassDescription, ColorModel, Rgba32};
+use rerun::{AnnotationContext, Arrows2D, LineStrips2D, Points2D, SegmentationImage, Transform3D};
 
 use super::{Gate, Logger, points, rgb};
 use crate::palette::{Rgb, dark};
@@ -27,13 +30,23 @@ pub(super) struct MapScene {
     pose: PlanarPose,
     estimated: Trail,
     truth: Trail,
-    legend_box: Option<[i64; 3]>,
+    legend_at: Option<Transform3D>,
 }
 
 impl MapScene {
     pub(super) fn new(log: &Logger, interval: Duration, robot_radius_m: f64) -> Self {
         // The viewer's y axis points down, the floor's up.
         log.show_always(entities::MAP, &Transform3D::from_scale([1.0, -1.0, 1.0]));
+        let classes = [
+            (Cell::Unknown, "unknown", dark::UNKNOWN),
+            (Cell::Free, "free", dark::FREE),
+            (Cell::Occupied, "occupied", dark::OCCUPIED),
+        ];
+        let class = |(cell, name, colour): (Cell, &str, Rgb)| {
+            ClassDescription::from((cell as u16, name, Rgba32::from_rgb(colour[0], colour[1], colour[2])))
+        };
+        log.show_always(entities::GRID, &AnnotationContext::new(classes.map(class)));
+        legend::show(log);
         Self {
             grid_gate: Gate::new(interval.max(Duration::from_millis(250))),
             scan_gate: Gate::new(interval),
@@ -43,7 +56,7 @@ impl MapScene {
             pose: PlanarPose::default(),
             estimated: Trail::default(),
             truth: Trail::default(),
-            legend_box: None,
+            legend_at: None,
         }
     }
 
@@ -56,17 +69,12 @@ impl MapScene {
         if !self.grid_gate.opens() {
             return;
         }
-        match encode::map_image(grid) {
-            Some(Ok(image)) => {
-                let at = [image.left_m as f32, image.top_m as f32, 0.0];
-                let side = image.resolution_m as f32;
-                let place = Transform3D::from_translation_scale(at, [side, -side, 1.0]);
-                let picture = EncodedImage::new(image.png).with_media_type(MediaType::PNG).with_draw_order(-10.0);
-                log.show_all(entities::GRID, &[&place, &picture]);
-            }
-            Some(Err(error)) => tracing::warn!(%error, "map not shown"),
-            None => {}
-        }
+        let Some(image) = encode::map_image(grid) else { return };
+        let place = placed(image.left_m, image.top_m, image.resolution_m);
+        self.show_legend(log, &image);
+        let format = ImageFormat::from_color_model(image.size, ColorModel::L, ChannelDatatype::U8);
+        let picture = SegmentationImage::new(image.classes, format).with_opacity(1.0).with_draw_order(-10.0);
+        log.show_all(entities::GRID, &[&place, &picture]);
     }
 
     pub(super) fn robot(&mut self, log: &Logger, pose: PlanarPose) {
@@ -96,13 +104,13 @@ impl MapScene {
         log.show(entities::TARGET, &target.with_colors([rgb(dark::TARGET)]).with_draw_order(10.0));
         match &state.goal {
             Some(goal) => show_goal(log, goal),
-            None => clear_goal(log),
+            None => show_no_goal(log),
         }
     }
 
     pub(super) fn forget_goal(&mut self, log: &Logger) {
-        clear_goal(log);
-        log.clear(entities::GOAL_BEARING);
+        show_no_goal(log);
+        log.show(entities::GOAL_BEARING, &LineStrips2D::clear_fields());
     }
 
     /// Shows a bearing without distance as a ray from where the robot stands.
@@ -140,6 +148,16 @@ impl MapScene {
     pub(super) fn shortest_path(&mut self, log: &Logger, path: &[(f64, f64)]) {
         let line = LineStrips2D::new([strip(path)]).with_radii([points(1.0)]).with_colors([rgb(dark::SHORTEST)]);
         log.show(entities::PATH_SHORTEST, &line.with_draw_order(7.0));
+    }
+
+    /// Keeps the legend below the map, as wide as a map of usual size.
+    fn show_legend(&mut self, log: &Logger, map: &encode::MapImage) {
+        let scale = map.width_m().clamp(7.0, 12.0) / legend::WIDTH_PX;
+        let place = placed(map.left_m, map.bottom_m() - 0.25, scale);
+        if self.legend_at.as_ref() != Some(&place) {
+            log.show(entities::LEGEND, &place);
+            self.legend_at = Some(place);
+        }
     }
 
     fn show_robot(&mut self, log: &Logger) {
@@ -190,12 +208,15 @@ fn show_goal(log: &Logger, goal: &GoalHypothesis) {
     let ellipse = LineStrips2D::new([outline]).with_radii([points(1.3)]).with_colors([rgb(dark::GOAL)]);
     let centre = Points2D::new([xy(goal.pose.x_m, goal.pose.y_m)]).with_radii([points(4.0)]);
     let centre = centre.with_colors([rgb(dark::GOAL)]).with_draw_order(17.0);
-    log.show_all(entities::GOAL_ELLIPSE, &[&ellipse.with_draw_order(17.0), &centre]);
+    log.show(entities::GOAL_ELLIPSE, &ellipse.with_draw_order(17.0));
+    log.show(entities::GOAL_CENTRE, &centre);
     log.show(entities::GOAL_HEADING, &arrow(&goal.pose, 0.5, dark::GOAL).with_draw_order(17.0));
 }
 
-fn clear_goal(log: &Logger) {
-    log.clear(entities::GOAL_ELLIPSE);
+fn show_no_goal(log: &Logger) {
+    log.show(entities::GOAL_ELLIPSE, &LineStrips2D::clear_fields());
+    log.show(entities::GOAL_CENTRE, &Points2D::clear_fields());
+    log.show(entities::GOAL_HEADING, &Arrows2D::clear_fields());
 }
 
 /// The ellipse that holds a position with 86 % (two standard deviations in two dimensions), closed.
@@ -208,6 +229,12 @@ fn two_sigma_outline(pose: &PlanarPose, covariance: Matrix2<f64>) -> Vec<[f32; 2
         xy(pose.x_m + p.x, pose.y_m + p.y)
     };
     (0..=48).map(on_ellipse).collect()
+}
+
+/// Puts an image's upper left corner to a point of the map, metres; `side_m` is that of a pixel.
+fn placed(left_m: f64, top_m: f64, side_m: f64) -> Transform3D {
+    let side = side_m as f32;
+    Transform3D::from_translation_scale([left_m as f32, top_m as f32, 0.0], [side, -side, 1.0])
 }
 
 fn arrow(pose: &PlanarPose, length_m: f64, colour: Rgb) -> Arrows2D {

@@ -1,10 +1,11 @@
-//! What the robot does and how fast: state lanes, plots, the running summary and the verdict.
+//! What the robot does and how fast: the mode over time, plots, the running summary and the verdict.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use homing_core::{Action, GoalEstimate, Mode, NavigationState, Sighting, UnseenReason};
-use rerun::{Scalars, SeriesLines, StateChange, StateConfiguration};
+use rerun::components::MarkerShape;
+use rerun::{Scalars, SeriesLines, SeriesPoints};
 
 use super::{Logger, rgb};
 use crate::entities;
@@ -19,42 +20,32 @@ const SERIES_MAX: usize = 24;
 #[derive(Default)]
 pub(super) struct StateScene {
     latencies: BTreeSet<String>,
+    modes: Vec<&'static str>,
     sighting: String,
     over: bool,
 }
 
 impl StateScene {
     pub(super) fn new(log: &Logger) -> Self {
-        let lane = |entity: &str, states: &[(&str, Rgb)]| {
-            let style = StateConfiguration::new()
-                .with_values(states.iter().map(|(name, _)| *name))
-                .with_colors(states.iter().map(|(_, colour)| rgb(*colour)));
-            log.show_always(entity, &style);
-        };
-        let modes = [Mode::Idle, Mode::Explore, Mode::Exploit, Mode::Align, Mode::Arrived, Mode::Failed];
-        lane(entities::MODE, &modes.map(mode_style));
-        let (none, bearing, pose) = (dark::NEUTRAL, dark::PLANNED, dark::GOAL);
-        lane(entities::SIGHTING, &[("not seen", none), ("bearing", bearing), ("pose", pose)]);
-        let actions = [Action::Forward, Action::TurnLeft, Action::TurnRight, Action::Stop, Action::Hold];
-        lane(entities::ACTION, &actions.map(action_style));
         for (entity, name, colour) in [
             (entities::MATCH_COUNT, "matches", dark::NEUTRAL),
             (entities::INLIER_COUNT, "verified by geometry", dark::GOAL),
         ] {
             log.show_always(entity, &series(name, colour));
         }
-        log.markdown("## Waiting for the robot\nNothing has arrived yet.");
         Self { sighting: "nothing yet".to_owned(), ..Self::default() }
     }
 
+    pub(super) fn begin(&self, log: &Logger) {
+        log.markdown("## Waiting for the robot\nNothing has arrived yet.");
+    }
+
     pub(super) fn estimate(&mut self, log: &Logger, estimate: &GoalEstimate) {
-        let (lane, n_inliers) = match &estimate.sighting {
-            Sighting::NotSeen { .. } => ("not seen", 0),
-            Sighting::Bearing { n_inliers, .. } => ("bearing", *n_inliers),
-            Sighting::Pose { n_inliers, .. } => ("pose", *n_inliers),
+        let n_inliers = match &estimate.sighting {
+            Sighting::NotSeen { .. } => 0,
+            Sighting::Bearing { n_inliers, .. } | Sighting::Pose { n_inliers, .. } => *n_inliers,
         };
         self.sighting = describe(&estimate.sighting);
-        log.show(entities::SIGHTING, &StateChange::single(lane));
         log.show(entities::MATCH_COUNT, &Scalars::new([estimate.n_matches as f64]));
         log.show(entities::INLIER_COUNT, &Scalars::new([n_inliers as f64]));
         let times = estimate.times;
@@ -64,11 +55,22 @@ impl StateScene {
     }
 
     pub(super) fn navigation(&mut self, log: &Logger, state: &NavigationState, driven_m: f64) {
-        log.show(entities::MODE, &StateChange::single(mode_style(state.mode).0));
-        log.show(entities::ACTION, &StateChange::single(action_style(state.action).0));
+        self.mode(log, state.mode);
         if !self.over {
             log.markdown(&self.summary(state, driven_m));
         }
+    }
+
+    /// A bar per mode, made of squares: the mode in force has one at every step, the others have none.
+    fn mode(&mut self, log: &Logger, mode: Mode) {
+        let (name, colour, lane) = mode_style(mode);
+        let entity = format!("{}/{name}", entities::MODE);
+        if !self.modes.contains(&name) {
+            let style = SeriesPoints::new().with_names([name]).with_colors([rgb(colour)]);
+            log.show_always(&entity, &style.with_markers([MarkerShape::Square]).with_marker_sizes([5.0]));
+            self.modes.push(name);
+        }
+        log.show(&entity, &Scalars::new([lane]));
     }
 
     pub(super) fn latency(&mut self, log: &Logger, name: &str, ms: f64) {
@@ -89,10 +91,10 @@ impl StateScene {
     }
 
     fn summary(&self, state: &NavigationState, driven_m: f64) -> String {
-        let mut text = format!("## {}\n{}\n\n| | |\n|---|---|\n", heading(state.mode), state.reason);
+        let mut text = format!("## {}\n{}\n\n", heading(state.mode), state.reason);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "| step | {} |", state.step);
-        let _ = writeln!(text, "| action | {} |", action_style(state.action).0);
+        let _ = writeln!(text, "| step | {} |\n|---|---|", state.step);
+        let _ = writeln!(text, "| action | {} |", action_name(state.action));
         let _ = writeln!(text, "| driven | {driven_m:.2} m |");
         let _ = writeln!(text, "| goal in view | {} |", self.sighting);
         if let Some(goal) = &state.goal {
@@ -138,23 +140,24 @@ fn heading(mode: Mode) -> &'static str {
     }
 }
 
-fn mode_style(mode: Mode) -> (&'static str, Rgb) {
+/// Name, colour and height in the plot: the further an episode is, the higher.
+fn mode_style(mode: Mode) -> (&'static str, Rgb, f64) {
     match mode {
-        Mode::Idle => ("idle", dark::NEUTRAL),
-        Mode::Explore => ("explore", dark::FRONTIER),
-        Mode::Exploit => ("drive to goal", dark::ESTIMATED),
-        Mode::Align => ("align", dark::PLANNED),
-        Mode::Arrived => ("arrived", dark::TRUE),
-        Mode::Failed => ("failed", dark::SCAN),
+        Mode::Idle => ("idle", dark::NEUTRAL, 0.0),
+        Mode::Explore => ("explore", dark::FRONTIER, 1.0),
+        Mode::Exploit => ("drive to goal", dark::ESTIMATED, 2.0),
+        Mode::Align => ("align", dark::PLANNED, 3.0),
+        Mode::Arrived => ("arrived", dark::TRUE, 4.0),
+        Mode::Failed => ("failed", dark::SCAN, 4.0),
     }
 }
 
-fn action_style(action: Action) -> (&'static str, Rgb) {
+fn action_name(action: Action) -> &'static str {
     match action {
-        Action::Forward => ("forward", dark::ESTIMATED),
-        Action::TurnLeft => ("turn left", dark::PLANNED),
-        Action::TurnRight => ("turn right", dark::TARGET),
-        Action::Stop => ("stop", dark::TRUE),
-        Action::Hold => ("hold", dark::NEUTRAL),
+        Action::Forward => "forward",
+        Action::TurnLeft => "turn left",
+        Action::TurnRight => "turn right",
+        Action::Stop => "stop",
+        Action::Hold => "hold",
     }
 }
