@@ -188,3 +188,53 @@ fn rgb(colour: crate::palette::Rgb) -> rerun::Color {
 fn points(radius: f32) -> rerun::Radius {
     rerun::Radius::new_ui_points(radius)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use homing_core::{GoalPhoto, Intrinsics, RgbImage};
+    use rerun::log::{Chunk, LogMsg};
+
+    use super::*;
+
+    /// Data that holds for all times hides whatever its entity shows later: only styles and fixed places may.
+    #[test]
+    fn what_comes_before_the_first_stamp_has_a_time() {
+        let (stream, storage) = rerun::RecordingStreamBuilder::new("test").memory().unwrap();
+        let mut scene = Scene::new(stream, &RecorderConfig::default());
+        let photo = GoalPhoto {
+            id: 1,
+            rgb: Arc::new(RgbImage::new(8, 6, vec![90; 8 * 6 * 3]).unwrap()),
+            intrinsics: Intrinsics::from_hfov(8, 6, 1.5).unwrap(),
+        };
+        let shown = std::thread::spawn(move || {
+            scene.begin();
+            scene.show(Update::Goal(photo));
+            scene.show(Update::Log { level: Level::Info, source: "test".to_owned(), text: "first".to_owned() });
+        });
+        shown.join().unwrap();
+        let chunks: Vec<Chunk> =
+            storage
+                .take()
+                .iter()
+                .filter_map(|message| {
+                    if let LogMsg::ArrowMsg(_, arrow) = message { Chunk::from_arrow_msg(arrow).ok() } else { None }
+                })
+                .collect();
+        let timed = |entity: &str| {
+            let path = rerun::EntityPath::from(entity);
+            chunks
+                .iter()
+                .filter(|chunk| *chunk.entity_path() == path)
+                .map(|chunk| !chunk.is_static())
+                .collect::<Vec<_>>()
+        };
+        for entity in
+            [entities::GOAL_PHOTO, entities::MATCH_LINES, entities::GOAL_ELLIPSE, entities::SUMMARY, "log/test"]
+        {
+            let timed = timed(entity);
+            assert!(!timed.is_empty() && timed.iter().all(|t| *t), "{entity}: {timed:?}");
+        }
+    }
+}
