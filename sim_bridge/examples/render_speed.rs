@@ -1,4 +1,6 @@
-//! Frames per second of the renderer: `render_speed SCENE.glb [frames]`, on a walk through the scene's bounding box.
+//! Frames per second of the renderer: `render_speed SCENE [frames]`, on a walk through the scene's bounding
+//! box. SCENE is a glTF file or the seed of a flat. The processor time (all threads, from /proc) does not depend on what else
+//! the machine is doing.
 
 #![expect(clippy::unwrap_used, reason = "a measuring tool may fail by panicking")]
 
@@ -27,7 +29,7 @@ fn main() {
     let mean = counts.iter().map(|c| c.triangles).sum::<usize>() / frames;
     println!("{mean} of {} triangles set up in a frame on average", counts[0].triangles_total);
     for round in 0..3 {
-        let begin = Instant::now();
+        let (begin, begin_cpu) = (Instant::now(), cpu_ms());
         let mut slowest = 0.0_f64;
         for pose in &poses {
             let begin = Instant::now();
@@ -36,12 +38,30 @@ fn main() {
             slowest = slowest.max(begin.elapsed().as_secs_f64() * 1e3);
         }
         let mean = begin.elapsed().as_secs_f64() * 1e3 / frames as f64;
-        println!("round {round}: {:.1} frames/s, {mean:.2} ms mean, {slowest:.2} ms at most", 1e3 / mean);
+        let cpu = (cpu_ms() - begin_cpu) / frames as f64;
+        println!(
+            "round {round}: {:.1} frames/s, {mean:.2} ms mean, {slowest:.2} ms at most; {cpu:.2} ms of processor time, \
+             {:.1} frames/s on two free cores",
+            1e3 / mean,
+            2e3 / cpu
+        );
     }
 }
 
+/// A number is the seed of a flat, anything else a glTF file.
 fn load(path: &str) -> Scene {
-    homing_sim::gltf_scene::load(Path::new(path)).unwrap()
+    match path.parse() {
+        Ok(seed) => homing_sim::flat::generate(seed).scene,
+        Err(_) => homing_sim::gltf_scene::load(Path::new(path)).unwrap(),
+    }
+}
+
+/// User time of all threads of this process, ms.
+fn cpu_ms() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let after_name = stat.rsplit(')').next().unwrap();
+    // Field 14 of the whole line, in ticks of 10 ms.
+    after_name.split_whitespace().nth(11).unwrap().parse::<f64>().unwrap() * 10.0
 }
 
 /// A spiral around the middle of the scene at camera height, turning.

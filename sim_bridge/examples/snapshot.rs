@@ -1,5 +1,5 @@
-//! Renders a scene to PNG: `snapshot SCENE.glb PREFIX X,Y,YAW_DEG[,Z[,PITCH_DEG]] ...` writes PREFIX_0.png (colour) and
-//! PREFIX_0_depth.png for every pose.
+//! Renders a scene to PNG: `snapshot SCENE PREFIX X,Y,YAW_DEG[,Z[,PITCH_DEG]] ...` writes PREFIX_0.png (colour) and
+//! PREFIX_0_depth.png for every pose. SCENE is a glTF file or the seed of a flat.
 
 #![expect(clippy::unwrap_used, reason = "a tool for looking at scenes may fail by panicking")]
 
@@ -28,8 +28,12 @@ fn main() {
     }
 }
 
+/// A number is the seed of a flat, anything else a glTF file.
 fn load(scene: &str) -> Scene {
-    homing_sim::gltf_scene::load(Path::new(scene)).unwrap()
+    match scene.parse() {
+        Ok(seed) => homing_sim::flat::generate(seed).scene,
+        Err(_) => homing_sim::gltf_scene::load(Path::new(scene)).unwrap(),
+    }
 }
 
 fn pose(numbers: &[f64]) -> Transform<World, Camera> {

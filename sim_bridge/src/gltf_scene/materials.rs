@@ -7,6 +7,9 @@ use crate::scene::Material;
 /// Alpha below which a blended surface is left out: the rasterizer knows opaque pixels and holes only.
 const BLEND_CUTOFF: f32 = 0.5;
 
+/// Linear albedo of white paint.
+const WHITE: f32 = 0.7;
+
 /// One look per material of the document, and after them the default one.
 pub fn read(document: &Document) -> Vec<Material> {
     let mut materials: Vec<Material> = document.materials().map(|material| look(&material)).collect();
@@ -22,9 +25,13 @@ pub fn read(document: &Document) -> Vec<Material> {
 
 fn look(material: &gltf::Material<'_>) -> Material {
     let surface = material.pbr_metallic_roughness();
+    let texture = surface.base_color_texture();
+    let [r, g, b, alpha] = surface.base_color_factor();
+    // No surface is whiter than this; files leave plain materials at the default 1.
+    let [r, g, b] = if texture.is_none() && !material.unlit() { [r, g, b].map(|c| c.min(WHITE)) } else { [r, g, b] };
     Material {
-        base_colour: surface.base_color_factor(),
-        texture: surface.base_color_texture().map(|info| info.texture().source().index()),
+        base_colour: [r, g, b, alpha],
+        texture: texture.map(|info| info.texture().source().index()),
         double_sided: material.double_sided(),
         alpha_cutoff: match material.alpha_mode() {
             AlphaMode::Opaque => 0.0,

@@ -1,12 +1,15 @@
 //! A scene cut into clusters of neighbouring triangles, with light baked into its corners.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
-use crate::render::light::Light;
+use crate::render::chart::{self, Chart};
+use crate::render::light::{Light, Place};
 use crate::scene::{Material, Mesh, Scene};
 
-/// Triangles of one cluster at most: small enough to cull well, large enough to keep the culling cheap.
-const CLUSTER_TRIANGLES: usize = 96;
+/// Faces of one cluster at most: small enough to cull well, large enough to keep the culling cheap.
+const CLUSTER_FACES: usize = 64;
 
 /// One corner as the shading pass needs it.
 #[derive(Copy, Clone, Debug)]
@@ -15,7 +18,8 @@ pub struct Corner {
     pub position: [f32; 3],
     /// Texture repeats.
     pub uv: [f32; 2],
-    /// What the texel is multiplied with, display exponent, red green blue.
+    /// What the texel is multiplied with, display exponent, red green blue. On a triangle with a chart: its place on the
+    /// chart, and nothing.
     pub light: [f32; 3],
 }
 
@@ -54,6 +58,10 @@ pub struct Geometry {
     pub corners: Vec<Corner>,
     /// Indices into `corners`.
     pub triangles: Vec<[u32; 3]>,
+    /// Index into `charts` of every triangle that has one.
+    pub chart_of: Vec<Option<u32>>,
+    /// Light maps of large faces.
+    pub charts: Vec<Chart>,
     /// One per material, and one for triangles whose material is missing.
     pub looks: Vec<Look>,
 }
@@ -71,7 +79,7 @@ impl Geometry {
             .par_iter()
             .map(|mesh| {
                 let material = scene.materials.get(mesh.material).unwrap_or(&plain);
-                split(mesh).iter().map(|triangles| part(mesh, triangles, material, &light)).collect()
+                split(mesh).par_iter().map(|faces| part(mesh, faces, material, &light)).collect()
             })
             .collect();
         for (mesh, parts) in scene.meshes.iter().zip(parts) {
@@ -88,6 +96,9 @@ impl Geometry {
         let (centre, half) = bounds(&part.corners);
         self.corners.extend(part.corners);
         self.triangles.extend(part.triangles.iter().map(|t| t.map(|i| i + offset)));
+        let first_chart = self.charts.len() as u32;
+        self.charts.extend(part.charts);
+        self.chart_of.extend(part.chart_of.iter().map(|chart| chart.map(|c| c + first_chart)));
         self.clusters.push(Cluster {
             corners: first_corner..self.corners.len(),
             triangles: first_triangle..self.triangles.len(),
@@ -99,9 +110,20 @@ impl Geometry {
 }
 
 /// A cluster before it has its place in the whole.
+#[derive(Default)]
 struct Part {
     corners: Vec<Corner>,
     triangles: Vec<[u32; 3]>,
+    charts: Vec<Chart>,
+    chart_of: Vec<Option<u32>>,
+}
+
+/// A triangle, or two that share a side and follow each other as a quadrilateral's do.
+#[derive(Copy, Clone, Debug)]
+struct Face {
+    first: [u32; 3],
+    fourth: Option<u32>,
+    centre: [f32; 3],
 }
 
 fn plain_material() -> Material {
@@ -116,64 +138,97 @@ fn look(material: &Material, white: usize) -> Look {
     }
 }
 
-/// Usable triangles of a mesh in groups of neighbours: the list is halved at the median of its longest axis until a
-/// group is small enough.
-fn split(mesh: &Mesh) -> Vec<Vec<[u32; 3]>> {
-    let usable = |t: &&[u32; 3]| {
-        t.iter().all(|&i| mesh.vertices.get(i as usize).is_some_and(|v| v.position.iter().all(|c| c.abs() < 1e6)))
-    };
-    let centred: Vec<([f32; 3], [u32; 3])> = mesh
-        .triangles
-        .iter()
-        .filter(usable)
-        .map(|t| {
-            let [a, b, c] = t.map(|i| mesh.vertices[i as usize].position);
-            (core::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0), *t)
-        })
-        .collect();
+/// Usable faces of a mesh in groups of neighbours: the list is halved at the median of its longest axis until a group is
+/// small enough.
+fn split(mesh: &Mesh) -> Vec<Vec<Face>> {
     let mut groups = Vec::new();
-    let mut open = vec![centred];
+    let mut open = vec![faces(mesh)];
     while let Some(mut group) = open.pop() {
-        if group.len() > CLUSTER_TRIANGLES {
+        if group.len() > CLUSTER_FACES {
             let axis = longest_axis(&group);
-            group.sort_by(|a, b| a.0[axis].total_cmp(&b.0[axis]));
+            group.sort_by(|a, b| a.centre[axis].total_cmp(&b.centre[axis]));
             let upper = group.split_off(group.len() / 2);
             open.push(upper);
             open.push(group);
         } else if !group.is_empty() {
-            groups.push(group.into_iter().map(|(_, t)| t).collect());
+            groups.push(group);
         }
     }
     groups
 }
 
-fn longest_axis(group: &[([f32; 3], [u32; 3])]) -> usize {
+fn faces(mesh: &Mesh) -> Vec<Face> {
+    let position = |i: u32| mesh.vertices.get(i as usize).map(|v| v.position);
+    let sound = |i: &u32| position(*i).is_some_and(|p| p.iter().all(|c| c.abs() < 1e6));
+    let mut faces: Vec<Face> = Vec::with_capacity(mesh.triangles.len() / 2);
+    for t in mesh.triangles.iter().filter(|t| t.iter().all(sound)) {
+        match faces.last_mut() {
+            Some(last) if last.fourth.is_none() && t[0] == last.first[0] && t[1] == last.first[2] => {
+                last.fourth = Some(t[2]);
+            }
+            _ => {
+                let [a, b, c] = t.map(|i| mesh.vertices[i as usize].position);
+                let centre = core::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0);
+                faces.push(Face { first: *t, fourth: None, centre });
+            }
+        }
+    }
+    faces
+}
+
+fn longest_axis(group: &[Face]) -> usize {
     let extent = |k: usize| {
-        let (low, high) = group.iter().fold((f32::MAX, f32::MIN), |(l, h), (c, _)| (l.min(c[k]), h.max(c[k])));
+        let (low, high) = group.iter().fold((f32::MAX, f32::MIN), |(l, h), f| (l.min(f.centre[k]), h.max(f.centre[k])));
         high - low
     };
     let sides = [extent(0), extent(1), extent(2)];
     (0..3).fold(0, |best, k| if sides[k] > sides[best] { k } else { best })
 }
 
-fn part(mesh: &Mesh, triangles: &[[u32; 3]], material: &Material, light: &Light) -> Part {
-    let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
-    used.sort_unstable();
-    used.dedup();
-    let place = |i: u32| used.partition_point(|&j| j < i) as u32;
-    let corner = |i: u32| {
-        let vertex = &mesh.vertices[i as usize];
-        let colour = mesh.colours.get(i as usize).copied().unwrap_or([1.0; 3]);
-        Corner {
-            position: vertex.position,
-            uv: vertex.uv.map(|c| if c.abs() < 1e5 { c } else { 0.0 }),
-            light: light.factor(vertex, colour, material),
+fn part(mesh: &Mesh, faces: &[Face], material: &Material, light: &Light<'_>) -> Part {
+    let mut part = Part::default();
+    // Where a vertex that is lit on its own has gone.
+    let mut placed: BTreeMap<u32, u32> = BTreeMap::new();
+    for face in faces {
+        let [a, b, c] = face.first;
+        let ring: Vec<u32> = [a, b, c].into_iter().chain(face.fourth).collect();
+        let baked = chart::bake(mesh, &ring, material, light);
+        let chart = baked.as_ref().map(|_| part.charts.len() as u32);
+        let here: Vec<u32> = match baked {
+            Some((chart, places)) => {
+                part.charts.push(chart);
+                let charted = ring.iter().zip(places).map(|(&i, [s, t])| corner(mesh, i, [s, t, 0.0]));
+                let first = part.corners.len() as u32;
+                part.corners.extend(charted);
+                (first..part.corners.len() as u32).collect()
+            }
+            None => ring
+                .iter()
+                .map(|&i| {
+                    *placed.entry(i).or_insert_with(|| {
+                        part.corners.push(corner(mesh, i, lit(mesh, i, material, light)));
+                        part.corners.len() as u32 - 1
+                    })
+                })
+                .collect(),
+        };
+        for k in 1..here.len() - 1 {
+            part.triangles.push([here[0], here[k], here[k + 1]]);
+            part.chart_of.push(chart);
         }
-    };
-    Part {
-        corners: used.iter().map(|&i| corner(i)).collect(),
-        triangles: triangles.iter().map(|t| t.map(place)).collect(),
     }
+    part
+}
+
+fn corner(mesh: &Mesh, i: u32, light: [f32; 3]) -> Corner {
+    let vertex = &mesh.vertices[i as usize];
+    Corner { position: vertex.position, uv: vertex.uv.map(|c| if c.abs() < 1e5 { c } else { 0.0 }), light }
+}
+
+fn lit(mesh: &Mesh, i: u32, material: &Material, light: &Light<'_>) -> [f32; 3] {
+    let vertex = &mesh.vertices[i as usize];
+    let colour = mesh.colours.get(i as usize).copied().unwrap_or([1.0; 3]);
+    light.factor(&Place { position: vertex.position, normal: vertex.normal }, colour, material)
 }
 
 fn bounds(corners: &[Corner]) -> ([f64; 3], [f64; 3]) {

@@ -14,8 +14,11 @@ const ONE: i32 = 1 << FRACTION_BITS;
 struct Level {
     texels: Vec<u32>,
     width_shift: u32,
-    mask_x: i32,
-    mask_y: i32,
+    mask_x: u32,
+    mask_y: u32,
+    // Sides in fractions of a texel.
+    scale_x: f32,
+    scale_y: f32,
 }
 
 /// A texture with all its halved copies. Sides are powers of two.
@@ -83,41 +86,47 @@ impl MipTexture {
 
 impl Level {
     fn new(texels: Vec<u32>, width: u32, height: u32) -> Self {
-        Self { texels, width_shift: width.trailing_zeros(), mask_x: width as i32 - 1, mask_y: height as i32 - 1 }
+        Self {
+            texels,
+            width_shift: width.trailing_zeros(),
+            mask_x: width - 1,
+            mask_y: height - 1,
+            scale_x: (width * ONE as u32) as f32,
+            scale_y: (height * ONE as u32) as f32,
+        }
     }
 
     /// The next level: 2x2 boxes averaged in linear light, colours weighted by alpha so that holes do not bleed.
     fn halved(&self) -> Self {
-        let (width, height) = ((self.mask_x as u32).div_ceil(2).max(1), (self.mask_y as u32).div_ceil(2).max(1));
-        let mut texels = Vec::with_capacity((width * height) as usize);
-        for y in 0..height as i32 {
-            for x in 0..width as i32 {
-                let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.texel(2 * x + dx, 2 * y + dy));
-                texels.push(average(four));
-            }
-        }
-        Self::new(texels, width, height)
-    }
-
-    #[inline]
-    fn texel(&self, x: i32, y: i32) -> u32 {
-        let index = (((y & self.mask_y) as usize) << self.width_shift) | (x & self.mask_x) as usize;
-        self.texels[index]
+        let (width, height) = (self.mask_x.div_ceil(2).max(1), self.mask_y.div_ceil(2).max(1));
+        let texel =
+            |x: u32, y: u32| self.texels[(((y & self.mask_y) << self.width_shift) | (x & self.mask_x)) as usize];
+        let box_of = |i: u32| {
+            let (x, y) = (2 * (i % width), 2 * (i / width));
+            average([texel(x, y), texel(x + 1, y), texel(x, y + 1), texel(x + 1, y + 1)])
+        };
+        Self::new((0..width * height).map(box_of).collect(), width, height)
     }
 
     #[inline]
     fn bilinear(&self, u: f32, v: f32) -> u64 {
-        let x = (u * ((self.mask_x + 1) * ONE) as f32 + HALF_TEXEL) as i32 - BIAS;
-        let y = (v * ((self.mask_y + 1) * ONE) as f32 + HALF_TEXEL) as i32 - BIAS;
+        // The bias is whole repeats of any texture: it needs not be taken off again.
+        let x = (u * self.scale_x + HALF_TEXEL) as i32;
+        let y = (v * self.scale_y + HALF_TEXEL) as i32;
         let (wx, wy) = ((x & (ONE - 1)) as u64, (y & (ONE - 1)) as u64);
-        let (x, y) = (x >> FRACTION_BITS, y >> FRACTION_BITS);
-        let top = lerp(spread(self.texel(x, y)), spread(self.texel(x + 1, y)), wx);
-        let bottom = lerp(spread(self.texel(x, y + 1)), spread(self.texel(x + 1, y + 1)), wx);
+        let (x, y) = ((x >> FRACTION_BITS) as u32, (y >> FRACTION_BITS) as u32);
+        let (x0, x1) = (x & self.mask_x, x.wrapping_add(1) & self.mask_x);
+        let (row0, row1) =
+            ((y & self.mask_y) << self.width_shift, (y.wrapping_add(1) & self.mask_y) << self.width_shift);
+        let texel = |row: u32, column: u32| spread(self.texels[(row | column) as usize]);
+        let top = lerp(texel(row0, x0), texel(row0, x1), wx);
+        let bottom = lerp(texel(row1, x0), texel(row1, x1), wx);
         lerp_wide(top, bottom, wy)
     }
 }
 
-/// Shifts to texel centres, and keeps the cast's argument positive so that cutting the fraction off rounds down.
+/// Shifts to texel centres, and keeps the cast's argument positive so that cutting the fraction off rounds down. A whole
+/// number of repeats for every side up to 4096 texels.
 const BIAS: i32 = 1 << 20;
 const HALF_TEXEL: f32 = (BIAS - ONE / 2) as f32;
 
@@ -130,7 +139,7 @@ fn spread(texel: u32) -> u64 {
 /// `value * 256` lanes between two lanes of bytes.
 #[inline]
 fn lerp(a: u64, b: u64, weight: u64) -> u64 {
-    a * (ONE as u64 - weight) + b * weight
+    a.wrapping_mul((ONE as u64).wrapping_sub(weight)).wrapping_add(b.wrapping_mul(weight))
 }
 
 /// Between two lanes of `value * 256`; keeps the scale.
@@ -139,7 +148,7 @@ fn lerp_wide(a: u64, b: u64, weight: u64) -> u64 {
     const BYTES: u64 = 0x00ff_00ff_00ff_00ff;
     let (a_high, a_low) = ((a >> 8) & BYTES, a & BYTES);
     let (b_high, b_low) = ((b >> 8) & BYTES, b & BYTES);
-    lerp(a_high, b_high, weight) + ((lerp(a_low, b_low, weight) >> 8) & BYTES)
+    lerp(a_high, b_high, weight).wrapping_add((lerp(a_low, b_low, weight) >> 8) & BYTES)
 }
 
 fn average(texels: [u32; 4]) -> u32 {

@@ -8,9 +8,11 @@
 //! independent, triangles keep one order (the first of two at equal depth wins), and only IEEE operations are used
 //! between set-up and pixel.
 
+mod chart;
 mod geometry;
 mod light;
 mod mip;
+mod occupancy;
 mod raster;
 mod setup;
 mod shade;

@@ -152,22 +152,29 @@ fn run(
     textures: &[MipTexture],
 ) {
     let look = &geometry.looks[triangle.look as usize];
+    let index = triangle.index as usize;
     let texturing = Texturing::new(triangle, geometry, &textures[look.texture]);
-    let corners = geometry.triangles[triangle.index as usize].map(|i| &geometry.corners[i as usize]);
+    let corners = geometry.triangles[index].map(|i| &geometry.corners[i as usize]);
     let light = [0, 1, 2].map(|k| attribute(triangle, corners, |c| f64::from(c.light[k])));
+    let chart = geometry.chart_of[index].map(|c| &geometry.charts[c as usize]);
     let start = [texturing.u, texturing.v, light[0], light[1], light[2]].map(|p| (p.at(x, y) as f32, p.x as f32));
     for (i, (depth, rgb)) in depth.iter_mut().zip(rgb.chunks_exact_mut(3)).enumerate() {
         let i = i as i32 as f32;
         let z = 1.0 / *depth;
         *depth = z;
-        let [u_z, v_z, red, green, blue] = start.map(|(value, step)| value + step * i);
+        let [u_z, v_z, a, b, c] = start.map(|(value, step)| value + step * i);
         let colour = texturing.sample(&texturing.footprint(u_z, v_z, z));
+        let [red, green, blue] = match chart {
+            Some(chart) => {
+                let [red, green, blue, _] = chart.at(a * z, b * z);
+                [red, green, blue]
+            }
+            None => [a * z, b * z, c * z],
+        };
         let lit = |lane: u32, light: f32| {
             let value = ((colour >> lane) & 0xffff) as i32 as f32;
-            (value * (light * z * (1.0 / 256.0)) + 0.5).max(0.0).min(255.0) as i32 as u8
+            (value * (light * (1.0 / 256.0)) + 0.5).max(0.0).min(255.0) as i32 as u8
         };
-        rgb[0] = lit(0, red);
-        rgb[1] = lit(32, green);
-        rgb[2] = lit(16, blue);
+        rgb.copy_from_slice(&[lit(0, red), lit(32, green), lit(16, blue)]);
     }
 }

@@ -5,12 +5,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::canvas::Canvas;
 use super::noise::{floor, fractal, random, step, value};
-use super::palette::{Colour, any, between, blend, hsl, noise_seed, one_of, shade};
+use super::palette::{Colour, any, between, blend, hsl, hue, noise_seed, one_of, shade};
 
 /// A weave in one colour, striped or chequered.
 pub fn fabric(rng: &mut ChaCha8Rng) -> Canvas {
-    let ground = any(rng, (0.08, 0.5), (0.3, 0.75));
-    let thread = any(rng, (0.1, 0.5), (0.3, 0.8));
+    let ground = any(rng, (0.06, 0.36), (0.3, 0.72));
+    let thread = any(rng, (0.08, 0.4), (0.3, 0.8));
     let (seed, kind) = (noise_seed(rng), rng.random_range(0..4_u32));
     let bands: Vec<f32> = (0..16).map(|_| if rng.random_bool(0.4) { 1.0 } else { 0.0 }).collect();
     Canvas::painted(256, 256, |u, v| {
@@ -35,11 +35,11 @@ pub fn fabric(rng: &mut ChaCha8Rng) -> Canvas {
 /// A border with teeth, a field with rows of motifs, a medallion.
 pub fn rug(rng: &mut ChaCha8Rng) -> Canvas {
     const SIDE: f32 = 512.0;
-    let hue: f32 = rng.random();
-    let ground = hsl(hue, between(rng, (0.3, 0.6)), between(rng, (0.25, 0.4)));
+    let hue = hue(rng);
+    let ground = hsl(hue, between(rng, (0.25, 0.5)), between(rng, (0.25, 0.4)));
     let border = hsl(hue + between(rng, (0.3, 0.6)), 0.4, between(rng, (0.25, 0.45)));
     let light = any(rng, (0.15, 0.4), (0.72, 0.85));
-    let accent = any(rng, (0.4, 0.7), (0.4, 0.6));
+    let accent = any(rng, (0.3, 0.6), (0.4, 0.6));
     let mut canvas = Canvas::plain(512, 512, light);
     canvas.rectangle((10.0, 6.0), (SIDE - 10.0, SIDE - 6.0), border);
     canvas.frame((22.0, 18.0), (SIDE - 22.0, SIDE - 18.0), 5.0, light);

@@ -20,9 +20,9 @@ pub fn window(rng: &mut ChaCha8Rng) -> Canvas {
     for layer in 0..3 {
         let (seed, base) = (noise_seed(rng), 270.0 + 40.0 * layer as f32);
         let green = hsl(between(rng, (0.22, 0.36)), 0.3, 0.58 - 0.1 * layer as f32);
-        canvas.fill((0.0, base - 80.0), (SIDE, SIDE), green, |x, y| {
-            base - 70.0 * (fractal(x / SIDE, 0.5, (3, 3), 4, seed) - 0.4) - y
-        });
+        let ridge: Vec<f32> =
+            (0..512).map(|x| base - 70.0 * (fractal(x as f32 / SIDE, 0.5, (3, 3), 4, seed) - 0.4)).collect();
+        canvas.fill((0.0, base - 80.0), (SIDE, SIDE), green, |x, y| ridge[x as usize % 512] - y);
     }
     for _ in 0..rng.random_range(3..7_u32) {
         let x = between(rng, (10.0, 450.0));

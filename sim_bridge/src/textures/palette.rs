@@ -21,7 +21,14 @@ pub fn hsl(hue: f32, saturation: f32, lightness: f32) -> Colour {
 
 /// Any hue, saturation and lightness within the ranges.
 pub fn any(rng: &mut ChaCha8Rng, saturation: (f32, f32), lightness: (f32, f32)) -> Colour {
-    hsl(rng.random(), between(rng, saturation), between(rng, lightness))
+    hsl(hue(rng), between(rng, saturation), between(rng, lightness))
+}
+
+/// A hue, in turns. Earth colours, greens and blues are more common in flats than violet and pink.
+pub fn hue(rng: &mut ChaCha8Rng) -> f32 {
+    let ranges = [(0.0, 0.14), (0.05, 0.16), (0.2, 0.42), (0.48, 0.64), (0.55, 0.66), (0.0, 1.0)];
+    let range = one_of(rng, &ranges);
+    between(rng, range)
 }
 
 /// A number within a range.

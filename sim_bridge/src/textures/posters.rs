@@ -22,8 +22,9 @@ fn scheme(rng: &mut ChaCha8Rng) -> Scheme {
     let dark = rng.random_bool(0.3);
     let (paper, ink) = (hsl(hue, 0.3, if dark { 0.16 } else { 0.9 }), hsl(hue, 0.3, if dark { 0.92 } else { 0.14 }));
     let spread = between(rng, (0.12, 0.36));
-    let accent =
-        |k: f32, rng: &mut ChaCha8Rng| hsl(hue + 0.5 + spread * k, between(rng, (0.5, 0.9)), between(rng, (0.4, 0.62)));
+    let accent = |k: f32, rng: &mut ChaCha8Rng| {
+        hsl(hue + 0.5 + spread * k, between(rng, (0.35, 0.8)), between(rng, (0.36, 0.6)))
+    };
     Scheme { paper, ink, accents: [accent(-1.0, rng), accent(0.0, rng), accent(1.0, rng)] }
 }
 
@@ -104,9 +105,9 @@ fn landscape(canvas: &mut Canvas, rng: &mut ChaCha8Rng, c: &Scheme) {
     for layer in 0..4 {
         let (seed, base) = (noise_seed(rng), 190.0 + 58.0 * layer as f32);
         let colour = shade(c.accents[1], 1.0 - 0.22 * layer as f32);
-        canvas.fill((0.0, base - 90.0), (SIDE, 400.0), colour, |x, y| {
-            base - 80.0 * (fractal(x / SIDE, 0.5, (4, 4), 4, seed) - 0.3) - y
-        });
+        let ridge: Vec<f32> =
+            (0..512).map(|x| base - 80.0 * (fractal(x as f32 / SIDE, 0.5, (4, 4), 4, seed) - 0.3)).collect();
+        canvas.fill((0.0, base - 90.0), (SIDE, 400.0), colour, |x, y| ridge[x as usize % 512] - y);
     }
     canvas.rectangle((0.0, 394.0), (SIDE, SIDE), c.paper);
     caption(canvas, rng, 404.0, c.ink);

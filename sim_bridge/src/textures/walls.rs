@@ -26,7 +26,8 @@ pub fn brick(rng: &mut ChaCha8Rng) -> Canvas {
         let rough = fractal(u, v, (40, 40), 3, seed);
         let edge_px = (fx.min(1.0 - fx) * 102.4).min(fy.min(1.0 - fy) * 32.0) - 2.0 + 2.4 * (rough - 0.5);
         let own = random(id.0, id.1, seed);
-        let hue = blend(clay, [clay[0] * 0.86, clay[1] * 0.92, clay[2] * 1.05], random(id.0, id.1, seed ^ 3));
+        let other = if painted { clay } else { [clay[0] * 0.86, clay[1] * 0.92, clay[2] * 1.05] };
+        let hue = blend(clay, other, random(id.0, id.1, seed ^ 3));
         let lit = 1.0 + 0.1 * (step(2.0, 0.0, fy * 32.0 - 2.0) - step(28.0, 30.0, fy * 32.0));
         let face = shade(hue, lit * (1.0 + variety * (own - 0.5) + 0.3 * (rough - 0.5)));
         blend(shade(mortar, 0.9 + 0.25 * (rough - 0.5)), face, step(0.0, 2.0, edge_px))
