@@ -1,6 +1,6 @@
 //! The decision to stop: close enough that no step leads closer, turned to the photo's heading, and seen to be so.
 
-use homing_core::{GoalEstimate, PlanarPose, Stamp};
+use homing_core::{PlanarPose, Stamp};
 
 use crate::config::BodyConfig;
 use crate::hypothesis::Hypothesis;
@@ -54,6 +54,7 @@ pub struct Arrival {
     n_waited: u32,
     confirmed: bool,
     n_denied: u32,
+    heard: Option<(Stamp, bool)>,
 }
 
 impl Arrival {
@@ -67,11 +68,11 @@ impl Arrival {
         self.aligning
     }
 
-    /// An estimate came; `agreed` with the hypothesis or not. Only images taken in place count.
-    pub fn hear(&mut self, estimate: &GoalEstimate, agreed: bool) {
-        if self.in_place_since.is_some_and(|since| estimate.stamp >= since) {
-            self.confirmed |= agreed;
-            self.n_denied += u32::from(!agreed);
+    /// An estimate of the image stamped `stamp` came; `agreed` with the hypothesis or not. Only images taken in place count.
+    pub fn hear(&mut self, stamp: Stamp, agreed: bool) {
+        self.heard = Some((stamp, agreed));
+        if self.in_place_since.is_some_and(|since| stamp >= since) {
+            self.count(agreed);
         }
     }
 
@@ -115,6 +116,10 @@ impl Arrival {
             self.n_waited = 0;
             self.confirmed = false;
             self.n_denied = 0;
+            // The estimate of this very image may have come with it.
+            if let Some((_, agreed)) = self.heard.filter(|(heard, _)| *heard >= stamp) {
+                self.count(agreed);
+            }
         }
         self.n_waited += 1;
         if self.confirmed {
@@ -124,6 +129,11 @@ impl Arrival {
         } else {
             Approach::Wait
         }
+    }
+
+    fn count(&mut self, agreed: bool) {
+        self.confirmed |= agreed;
+        self.n_denied += u32::from(!agreed);
     }
 
     fn leave(&mut self) {

@@ -4,7 +4,7 @@
 //! do not open another hypothesis, and a hypothesis that is looked at from near and not confirmed is dropped and its place
 //! remembered as one that lied.
 
-use homing_core::{Base, Camera, Goal, Odom, PlanarPose, Sighting, Stamp, Transform, wrap_angle};
+use homing_core::{Base, Camera, Goal, Odom, PlanarPose, Stamp, Transform, wrap_angle};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
 use crate::hypothesis::Hypothesis;
@@ -32,6 +32,8 @@ pub struct FilterConfig {
     pub drift_rad: f64,
     /// Views that should have shown the goal and did not, in a row, before its hypothesis is dropped.
     pub misses_max: u32,
+    /// A hypothesis keeps this share of its support when a view that should have shown the goal did not.
+    pub miss_factor: f64,
     /// Within this distance a view that matches the photo's must show it, metres.
     pub verify_m: f64,
     /// And within this difference of heading, radians.
@@ -52,6 +54,7 @@ impl Default for FilterConfig {
             drift_m: 0.005,
             drift_rad: 0.002,
             misses_max: 4,
+            miss_factor: 0.65,
             verify_m: 1.0,
             verify_rad: 0.5,
             liar_m: 0.6,
@@ -69,6 +72,24 @@ pub enum Joined {
     Opened,
     /// Its place lied before.
     Refused,
+}
+
+/// Whether anything on the map stands between the robot and a place.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum View {
+    /// Nothing known.
+    Clear,
+    /// An obstacle.
+    Hidden,
+}
+
+/// What a view that did not show the goal says about the best hypothesis.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// Not enough to drop it.
+    None,
+    /// It is wrong.
+    Refuted,
 }
 
 /// A place that perception named and that was not the goal.
@@ -136,6 +157,7 @@ impl GoalFilter {
         let pose = t_odom_goalbase.planar();
         let here = t_odom_base.planar();
         let range_m = here.distance_to(pose.x_m, pose.y_m);
+        let turn_rad = wrap_angle(pose.yaw_rad - here.yaw_rad).abs();
         let floor = (self.config.position_sd_min_m + self.config.position_sd_per_m * range_m).powi(2);
         let mut planar = Matrix3::zeros();
         planar.fixed_view_mut::<2, 2>(0, 0).copy_from(&position.fixed_view::<2, 2>(0, 0));
@@ -145,7 +167,7 @@ impl GoalFilter {
         let sound = [pose.x_m, pose.y_m, pose.yaw_rad, range_m].iter().all(|v| v.is_finite())
             && planar.iter().all(|v| v.is_finite())
             && planar.cholesky().is_some();
-        sound.then_some(Measurement { stamp, pose, covariance: planar, n_inliers, range_m })
+        sound.then_some(Measurement { stamp, pose, covariance: planar, n_inliers, from: here, range_m, turn_rad })
     }
 
     /// Fuses a measurement with the hypothesis it agrees with best, or opens a new one.
@@ -217,19 +239,24 @@ impl GoalFilter {
         &self.hypotheses
     }
 
-    /// Perception looked from `pose` and `sighting` is what it said. Counts against the best hypothesis if the view was near
-    /// enough to the photo's that it should have agreed. Returns true when the hypothesis has been missed too often.
-    pub fn verify(&mut self, pose: &PlanarPose, sighting: &Sighting, agreed: bool, step: u64) -> bool {
+    /// Perception looked from `pose`, with nothing in between if `clear`, and did not agree with the best hypothesis. From a
+    /// view that is no worse than those that did agree this is held against it; from one that is all but the photo's own,
+    /// `misses_max` times in a row, it refutes it.
+    pub fn doubt(&mut self, pose: &PlanarPose, clear: View, step: u64) -> Doubt {
         let config = self.config;
-        let Some(best) = self.best_index(step) else { return false };
+        let Some(best) = self.best_index(step) else { return Doubt::None };
         let hypothesis = &mut self.hypotheses[best];
-        let near = pose.distance_to(hypothesis.pose.x_m, hypothesis.pose.y_m) <= config.verify_m;
-        let alike = wrap_angle(pose.yaw_rad - hypothesis.pose.yaw_rad).abs() <= config.verify_rad;
-        let partly = matches!(sighting, Sighting::Bearing { .. });
-        if !agreed && near && alike && !partly {
+        let range_m = pose.distance_to(hypothesis.pose.x_m, hypothesis.pose.y_m);
+        let turn_rad = wrap_angle(pose.yaw_rad - hypothesis.pose.yaw_rad).abs();
+        let alike = range_m <= config.verify_m && turn_rad <= config.verify_rad;
+        let no_worse = range_m <= hypothesis.farthest_m && turn_rad <= hypothesis.widest_rad + 0.1;
+        if alike {
             hypothesis.n_misses += 1;
         }
-        hypothesis.n_misses >= config.misses_max
+        if alike || (no_worse && clear == View::Clear) {
+            hypothesis.support *= config.miss_factor;
+        }
+        if hypothesis.n_misses >= config.misses_max { Doubt::Refuted } else { Doubt::None }
     }
 
     /// The best hypothesis was wrong: drop it and do not believe its place again.

@@ -3,6 +3,14 @@
 use homing_core::{GoalHypothesis, PlanarPose, Stamp, wrap_angle};
 use nalgebra::{Matrix3, Vector3};
 
+/// A view is a new one if the body moved or turned this much since the last.
+const NEW_VIEW_M: f64 = 0.05;
+const NEW_VIEW_RAD: f64 = 0.09;
+/// What a view that is not new counts for.
+const STALE_VIEW: f64 = 0.2;
+/// Support does not grow beyond this, so that doubts still count.
+const SUPPORT_MAX: f64 = 600.0;
+
 /// A measured goal pose in the odometry frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measurement {
@@ -14,8 +22,12 @@ pub struct Measurement {
     pub covariance: Matrix3<f64>,
     /// Matches that agree.
     pub n_inliers: usize,
+    /// Pose of the base when the image was taken, odometry frame.
+    pub from: PlanarPose,
     /// Distance from the robot when the image was taken, metres.
     pub range_m: f64,
+    /// Difference between the robot's heading then and the goal's, radians, not negative.
+    pub turn_rad: f64,
 }
 
 /// A goal hypothesis with its history.
@@ -37,6 +49,12 @@ pub struct Hypothesis {
     pub last_seen_step: u64,
     /// Smallest distance at which an estimate agreed, metres.
     pub nearest_m: f64,
+    /// Largest distance at which an estimate agreed, metres.
+    pub farthest_m: f64,
+    /// Largest difference of heading at which an estimate agreed, radians.
+    pub widest_rad: f64,
+    /// Where the robot was at the newest agreeing estimate.
+    pub seen_from: PlanarPose,
     /// Views in a row that should have confirmed it and did not.
     pub n_misses: u32,
     /// Not to be driven to before this step: no way led there.
@@ -55,6 +73,9 @@ impl Hypothesis {
             last_seen: measurement.stamp,
             last_seen_step: step,
             nearest_m: measurement.range_m,
+            farthest_m: measurement.range_m,
+            widest_rad: measurement.turn_rad,
+            seen_from: measurement.from,
             n_misses: 0,
             parked_until: 0,
         }
@@ -68,21 +89,29 @@ impl Hypothesis {
             .map_or(f64::INFINITY, |inverse| (innovation.transpose() * inverse * innovation).x)
     }
 
-    /// Fuses a measurement in information form: informations add, the mean is their weighted mean.
+    /// Fuses a measurement in information form: informations add, the mean is their weighted mean. Another look from where
+    /// the last one was made shows the same matches with the same errors, so it counts for little.
     pub fn fuse(&mut self, measurement: &Measurement, step: u64) {
+        let moved_m = self.seen_from.distance_to(measurement.from.x_m, measurement.from.y_m);
+        let turned_rad = wrap_angle(self.seen_from.yaw_rad - measurement.from.yaw_rad).abs();
+        let novelty = if moved_m > NEW_VIEW_M || turned_rad > NEW_VIEW_RAD { 1.0 } else { STALE_VIEW };
         let (Some(own), Some(other)) = (self.covariance.try_inverse(), measurement.covariance.try_inverse()) else {
             return;
         };
+        let other = other * novelty;
         let Some(covariance) = (own + other).try_inverse() else { return };
         let correction = covariance * other * difference(&measurement.pose, &self.pose);
         self.covariance = symmetric(&covariance);
         self.shift(&correction);
         self.n_fused += 1;
-        self.support += measurement.n_inliers as f64;
+        self.support = (self.support + novelty * measurement.n_inliers as f64).min(SUPPORT_MAX);
+        self.seen_from = measurement.from;
         self.n_inliers_best = self.n_inliers_best.max(measurement.n_inliers);
         self.last_seen = self.last_seen.max(measurement.stamp);
         self.last_seen_step = step;
         self.nearest_m = self.nearest_m.min(measurement.range_m);
+        self.farthest_m = self.farthest_m.max(measurement.range_m);
+        self.widest_rad = self.widest_rad.max(measurement.turn_rad);
         self.n_misses = 0;
     }
 

@@ -26,9 +26,10 @@ mod terrain;
 
 pub use arrival::ArrivalConfig;
 pub use config::{BlindPolicy, BodyConfig, ConfigError, PlannerConfig, UnknownCells};
+pub use discovery::{Frontier, FrontierConfig, Straight};
 pub use event::{Mission, Perception, PlannerObservation, StepEvent};
 pub use fmm::{Marcher, Until};
-pub use goal_filter::{FilterConfig, GoalFilter, Joined, Measurement};
+pub use goal_filter::{Doubt, FilterConfig, GoalFilter, Joined, Measurement, View};
 pub use local::{LocalChoice, LocalPlanner};
 pub use mapper::{Integrated, Mapper, MapperConfig};
 pub use planner::Planner;

@@ -57,6 +57,13 @@ impl LocalPlanner {
         }
     }
 
+    /// The step that leads farthest from obstacles: the way out of a trap.
+    #[must_use]
+    pub fn withdraw(&self, pose: &PlanarPose, terrain: &Terrain) -> LocalChoice {
+        let crowding = |end: (f64, f64)| -f64::from(terrain.square_at(end.0, end.1)).sqrt() * 0.01;
+        self.best_heading(pose, terrain, crowding).map_or(LocalChoice::Nowhere, |(turns, _)| self.toward(turns))
+    }
+
     /// The step that best shortens the straight distance to a near target; `Nowhere` once no step shortens it by `gain_m`.
     #[must_use]
     pub fn close_in(&self, pose: &PlanarPose, target_m: (f64, f64), gain_m: f64, terrain: &Terrain) -> LocalChoice {

@@ -16,6 +16,8 @@ pub struct Progress {
     /// Turns still to make to get away from where the body is stuck.
     escape_turns: u32,
     n_escapes: u32,
+    least_cost_m: f32,
+    n_stalled: u32,
 }
 
 impl Progress {
@@ -24,21 +26,17 @@ impl Progress {
         *self = Self::default();
     }
 
-    /// True if the last action was a forward that did not come through (SLING: it moved less than 0.10 m).
-    pub fn was_blocked(
-        &mut self,
-        last: Action,
-        outcome: Option<&MotionOutcome>,
-        moved_m: f64,
-        body: &BodyConfig,
-    ) -> bool {
-        if last != Action::Forward {
+    /// True if the last motion was a forward that did not come through (SLING: it moved less than 0.10 m).
+    pub fn was_blocked(&mut self, commanded: Action, outcome: &MotionOutcome, body: &BodyConfig) -> bool {
+        if commanded != Action::Forward || !outcome.moved.x_m.is_finite() {
             return false;
         }
-        let forward_m = outcome.map_or(moved_m, |o| o.moved.x_m);
-        let blocked =
-            forward_m < 0.4 * body.forward_m || outcome.is_some_and(|o| o.blocked && forward_m < 0.8 * body.forward_m);
+        let share = outcome.moved.x_m / body.forward_m;
+        let blocked = share < 0.4 || (outcome.blocked && share < 0.8);
         self.n_blocked = if blocked { self.n_blocked + 1 } else { 0 };
+        if !blocked {
+            self.n_escapes = 0;
+        }
         blocked
     }
 
@@ -54,10 +52,37 @@ impl Progress {
         self.escape_turns = ((core::f64::consts::FRAC_PI_2 / body.turn_rad).ceil() as u32).clamp(1, 24);
     }
 
-    /// The next turn of an escape, if one is under way.
-    pub fn escape(&mut self) -> Option<Action> {
-        self.escape_turns = self.escape_turns.checked_sub(1)?;
-        Some(if self.n_escapes % 2 == 1 { Action::TurnLeft } else { Action::TurnRight })
+    /// True while turning away.
+    pub fn is_escaping(&self) -> bool {
+        self.escape_turns > 0
+    }
+
+    /// Turned away several times without one forward coming through in between.
+    pub fn is_trapped(&self) -> bool {
+        self.n_escapes >= 3
+    }
+
+    /// The next turn of an escape.
+    pub fn escape(&mut self) -> Action {
+        self.escape_turns = self.escape_turns.saturating_sub(1);
+        if self.n_escapes % 2 == 1 { Action::TurnLeft } else { Action::TurnRight }
+    }
+
+    /// Watches the way left to a goal. Returns true once it has not become shorter for `steps_max` steps.
+    pub fn is_stalled(&mut self, cost_m: f32, steps_max: u32) -> bool {
+        if cost_m < self.least_cost_m - 0.1 {
+            self.least_cost_m = cost_m;
+            self.n_stalled = 0;
+        } else {
+            self.n_stalled += 1;
+        }
+        self.n_stalled > steps_max
+    }
+
+    /// A new approach to a goal begins.
+    pub fn begin_approach(&mut self) {
+        self.least_cost_m = f32::INFINITY;
+        self.n_stalled = 0;
     }
 }
 

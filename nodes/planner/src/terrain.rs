@@ -200,18 +200,27 @@ impl Terrain {
     fn measure_columns(&mut self, map: &OccupancyGrid) {
         let (width, cap) = (self.geometry.width, self.reach as i16);
         let w = self.window;
+        // Distances stay below a hundred cells, so nothing here can wrap; plain sums would keep the loops from vectorising.
         for row in w.row_min..w.row_max {
-            for column in w.column_min..w.column_max {
-                let at = row * width + column;
-                let before = if row > w.row_min { self.column_distance[at - width] } else { cap };
-                self.column_distance[at] = if map.cells[at] == Cell::Occupied { 0 } else { (before + 1).min(cap) };
+            let line = row * width + w.column_min..row * width + w.column_max;
+            let (above, rest) = self.column_distance.split_at_mut(line.start);
+            let here = &mut rest[..line.len()];
+            let cells = &map.cells[line.clone()];
+            if row == w.row_min {
+                here.fill(cap);
+            } else {
+                here.copy_from_slice(&above[line.start - width..line.end - width]);
+            }
+            for (distance, cell) in here.iter_mut().zip(cells) {
+                *distance = if *cell == Cell::Occupied { 0 } else { distance.wrapping_add(1).min(cap) };
             }
         }
         for row in (w.row_min..w.row_max.saturating_sub(1)).rev() {
-            for column in w.column_min..w.column_max {
-                let at = row * width + column;
-                let after = self.column_distance[at + width] + 1;
-                self.column_distance[at] = self.column_distance[at].min(after);
+            let line = row * width + w.column_min..row * width + w.column_max;
+            let (head, below) = self.column_distance.split_at_mut(line.end);
+            let below = &below[width - line.len()..][..line.len()];
+            for (distance, after) in head[line.start..].iter_mut().zip(below) {
+                *distance = (*distance).min(after.wrapping_add(1));
             }
         }
     }
@@ -231,10 +240,10 @@ impl Terrain {
                 let extra = (shift * shift) as i16;
                 let n = source.len() - shift;
                 for (to, from) in nearest[..n].iter_mut().zip(&source[shift..]) {
-                    *to = (*to).min(from + extra);
+                    *to = (*to).min(from.wrapping_add(extra));
                 }
                 for (to, from) in nearest[shift..].iter_mut().zip(&source[..n]) {
-                    *to = (*to).min(from + extra);
+                    *to = (*to).min(from.wrapping_add(extra));
                 }
             }
         }

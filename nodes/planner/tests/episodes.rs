@@ -21,7 +21,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 #[test]
 fn frontier_finds_the_goal_and_straight_seldom_does() {
-    let n = 40;
+    let n: u64 = std::env::var("N").map_or(40, |v| v.parse().unwrap());
     let frontier: Vec<Outcome> = (0..n).map(|seed| episode(seed, Box::new(Frontier::default()))).collect();
     for (seed, o) in frontier.iter().enumerate() {
         println!(

@@ -45,6 +45,9 @@ pub struct Coverage {
     reachable: Vec<bool>,
     stamp: Vec<u32>,
     stamp_now: u32,
+    /// Cells along each ray, as offsets.
+    fan: Vec<Vec<(isize, isize)>>,
+    fan_range_m: f64,
 }
 
 impl Coverage {
@@ -75,9 +78,10 @@ impl Coverage {
         let middle = (per as i64 - 1) / 2;
         let mut nearest = vec![(i64::MAX, (0, 0)); self.reachable.len()];
         for (row, line) in travel_m.chunks_exact(map.geometry.width).enumerate() {
-            for (column, _) in line.iter().enumerate().filter(|(_, t)| t.is_finite()) {
-                let at = (row / per) * self.columns + column / per;
-                let (dc, dr) = ((column % per) as i64 - middle, (row % per) as i64 - middle);
+            let (place_row, dr) = (row / per * self.columns, (row % per) as i64 - middle);
+            for (column, _) in line.iter().enumerate().filter(|(_, t)| **t < f32::INFINITY) {
+                let at = place_row + column / per;
+                let dc = (column % per) as i64 - middle;
                 let away = dc * dc + dr * dr;
                 if away < nearest[at].0 {
                     nearest[at] = (away, (column, row));
@@ -90,26 +94,29 @@ impl Coverage {
         nearest.into_iter().enumerate().filter(|(_, n)| n.0 < i64::MAX).map(|(at, n)| (at, n.1)).collect()
     }
 
-    /// Places in line of sight of a point.
-    pub fn in_sight(&mut self, map: &OccupancyGrid, from_m: (f64, f64), range_m: f64) -> Vec<Place> {
+    /// Places in line of sight of a cell.
+    pub fn in_sight(&mut self, map: &OccupancyGrid, (column, row): (usize, usize), range_m: f64) -> Vec<Place> {
+        if self.fan_range_m != range_m {
+            self.fan = fan(range_m, map.geometry.resolution_m);
+            self.fan_range_m = range_m;
+        }
         self.stamp_now = self.stamp_now.wrapping_add(1);
-        let n_steps = (range_m / RAY_STEP_M) as usize;
-        let hope = (HOPE_M / RAY_STEP_M) as usize;
+        let hope = (HOPE_M / RAY_STEP_M) as u32;
+        let (width, height) = (map.geometry.width, map.geometry.height);
         let mut places = Vec::new();
-        for ray in 0..N_RAYS {
-            let (sin, cos) = sin_cos(core::f64::consts::TAU * ray as f64 / N_RAYS as f64);
+        for ray in &self.fan {
             let mut n_unknown = 0;
-            for step in 0..=n_steps {
-                let along = step as f64 * RAY_STEP_M;
-                let Some((column, row)) = map.geometry.cell_at(from_m.0 + along * cos, from_m.1 + along * sin) else {
+            for (step, &(across, up)) in ray.iter().enumerate() {
+                let (c, r) = (column.wrapping_add_signed(across), row.wrapping_add_signed(up));
+                if c >= width || r >= height {
                     break;
-                };
-                let cell = map.at(column, row);
-                n_unknown += usize::from(cell == Cell::Unknown);
+                }
+                let cell = map.cells[r * width + c];
+                n_unknown += u32::from(cell == Cell::Unknown);
                 if (cell == Cell::Occupied && step > 0) || n_unknown > hope {
                     break;
                 }
-                let index = (row / self.cells_per_place) * self.columns + column / self.cells_per_place;
+                let index = (r / self.cells_per_place) * self.columns + c / self.cells_per_place;
                 if self.stamp[index] != self.stamp_now {
                     self.stamp[index] = self.stamp_now;
                     places.push(Place { index, unknown: cell == Cell::Unknown });
@@ -133,16 +140,23 @@ impl Coverage {
         self.gain_of(places, u16::MAX, unknown_worth)
     }
 
-    /// The same, looking only along headings from `from_rad` to `to_rad` (in steps of `step_rad`).
-    pub fn gain_of_turn_m2(
+    /// The same, with one more turn at a time from `yaw_rad`: what is shown after 1, 2, ... `n` turns of `turn_rad` (left
+    /// positive).
+    pub fn gains_of_turns_m2(
         &self,
         places: &[Place],
-        headings_rad: impl Iterator<Item = f64>,
+        yaw_rad: f64,
+        (turn_rad, n): (f64, usize),
         likeness: &Likeness,
         unknown_worth: f64,
-    ) -> f64 {
-        let mask = headings_rad.fold(0, |mask, heading| mask | directions_like(heading, likeness.half_angle_rad));
-        self.gain_of(places, mask, unknown_worth)
+    ) -> Vec<f64> {
+        let mut shown = 0;
+        (1..=n)
+            .map(|k| {
+                shown |= directions_like(yaw_rad + k as f64 * turn_rad, likeness.half_angle_rad);
+                self.gain_of(places, shown, unknown_worth)
+            })
+            .collect()
     }
 
     fn gain_of(&self, places: &[Place], directions: u16, unknown_worth: f64) -> f64 {
@@ -156,6 +170,18 @@ impl Coverage {
         }
         gain * PLACE_M * PLACE_M / f64::from(N_SECTORS)
     }
+}
+
+/// Cells along rays in all directions, as offsets (columns, rows) from where they start.
+fn fan(range_m: f64, resolution_m: f64) -> Vec<Vec<(isize, isize)>> {
+    let n_steps = (range_m / RAY_STEP_M) as usize;
+    (0..N_RAYS)
+        .map(|ray| {
+            let (sin, cos) = sin_cos(core::f64::consts::TAU * ray as f64 / N_RAYS as f64);
+            let cells = |along: f64| (along / resolution_m).round() as isize;
+            (0..=n_steps).map(|step| step as f64 * RAY_STEP_M).map(|m| (cells(m * cos), cells(m * sin))).collect()
+        })
+        .collect()
 }
 
 /// The directions that a view along `yaw_rad` stands for.

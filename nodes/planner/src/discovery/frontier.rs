@@ -8,6 +8,9 @@ use homing_core::{Action, BearingHint, Directive, DiscoveryView, GoalDiscovery, 
 use super::coverage::{Coverage, Likeness, Place};
 use crate::angles::distance;
 
+/// Decisions granted for any target, and eight more per metre of way: two per step forward.
+const PATIENCE: u32 = 40;
+
 /// Knobs of the frontier policy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrontierConfig {
@@ -17,8 +20,8 @@ pub struct FrontierConfig {
     pub passes: Vec<(f64, f64)>,
     /// A look around begins when it shows at least this much, square metres times share of directions.
     pub look_min_m2: f64,
-    /// A look around ends when it would show less than this.
-    pub look_end_m2: f64,
+    /// What one turn costs, as metres of way: turns take steps, but no way.
+    pub turn_cost_m: f64,
     /// Places that show less are not worth the way.
     pub gain_min_m2: f64,
     /// An unknown place is worth this share of a known one.
@@ -36,8 +39,8 @@ impl Default for FrontierConfig {
         Self {
             turn_rad: 15.0_f64.to_radians(),
             passes: vec![(3.0, 0.70), (1.75, 0.53)],
-            look_min_m2: 2.5,
-            look_end_m2: 0.6,
+            look_min_m2: 0.4,
+            turn_cost_m: 0.08,
             gain_min_m2: 0.8,
             unknown_worth: 0.5,
             way_offset_m: 1.0,
@@ -66,6 +69,8 @@ pub struct Frontier {
     fresh: bool,
     turning: Option<Action>,
     target: Option<Viewpoint>,
+    /// Decisions left to reach the target before it is given up.
+    patience: u32,
     /// Places that promised something and did not keep it.
     barren: Vec<usize>,
     candidates: Vec<Viewpoint>,
@@ -82,6 +87,7 @@ impl Frontier {
             fresh: true,
             turning: None,
             target: None,
+            patience: 0,
             barren: Vec::new(),
             candidates: Vec::new(),
         }
@@ -110,14 +116,17 @@ impl GoalDiscovery for Frontier {
         }
         loop {
             let Some(likeness) = self.likeness() else { return Directive::Exhausted };
-            let here = (view.pose.x_m, view.pose.y_m);
+            let Some(here) = view.map.geometry.cell_at(view.pose.x_m, view.pose.y_m) else {
+                return Directive::Exhausted;
+            };
             let viewpoints = self.coverage.find_reachable(view.map, view.travel_m);
             let places = self.coverage.in_sight(view.map, here, likeness.range_m);
             self.coverage.look(&places, view.pose.yaw_rad, &likeness);
-            if let Some(turn) = self.look_around(view, &places, &likeness) {
+            let target = self.choose(view, &viewpoints, &likeness);
+            if let Some(turn) = self.look_around(view, &places, &likeness, target) {
                 return Directive::Act(turn);
             }
-            if let Some(target) = self.choose(view, &viewpoints, &likeness) {
+            if let Some(target) = target {
                 return Directive::GoTo { x_m: target.x_m, y_m: target.y_m };
             }
             self.pass += 1;
@@ -137,26 +146,34 @@ impl Frontier {
         self.config.passes.get(self.pass).map(|&(range_m, half_angle_rad)| Likeness { range_m, half_angle_rad })
     }
 
-    /// One more turn, if looking around from here still shows something.
-    fn look_around(&mut self, view: &DiscoveryView<'_>, places: &[Place], likeness: &Likeness) -> Option<Action> {
-        let at_target = self.at_target(view);
-        let enough = match (self.turning, at_target) {
-            (Some(_), _) | (None, true) => self.config.look_end_m2,
-            (None, false) => self.config.look_min_m2,
+    /// One more turn, if looking around from here shows more for its cost than driving on.
+    fn look_around(
+        &mut self,
+        view: &DiscoveryView<'_>,
+        places: &[Place],
+        likeness: &Likeness,
+        best: Option<Viewpoint>,
+    ) -> Option<Action> {
+        let n_turns = (core::f64::consts::TAU / self.config.turn_rad).round() as usize;
+        let worth = |sign: f64| {
+            let turn = (sign * self.config.turn_rad, n_turns);
+            let gains =
+                self.coverage.gains_of_turns_m2(places, view.pose.yaw_rad, turn, likeness, self.config.unknown_worth);
+            let at = |(i, gain): (usize, &f64)| *gain / (self.config.turn_cost_m * (i as f64 + 1.0) + 0.15);
+            let all = gains.last().copied().unwrap_or(0.0);
+            (gains.iter().enumerate().map(at).fold(0.0, f64::max), all)
         };
-        let gain = self.coverage.gain_m2(places, self.config.unknown_worth);
-        if gain < enough {
+        let ((left, all), (right, _)) = (worth(1.0), worth(-1.0));
+        // To go on is cheaper than to come back.
+        let (patience, least) = if self.turning.is_some() { (0.7, 0.1) } else { (1.0, self.config.look_min_m2) };
+        let elsewhere = best.map_or(0.0, |b| b.utility);
+        if all < least || left.max(right) < patience * elsewhere {
             self.turning = None;
             return None;
         }
-        let side = |sign: f64| {
-            let headings = (1..=8).map(|k| view.pose.yaw_rad + sign * f64::from(k) * self.config.turn_rad);
-            self.coverage.gain_of_turn_m2(places, headings, likeness, self.config.unknown_worth)
-        };
-        let (left, right) = (side(1.0), side(-1.0));
         let turn = match self.turning {
-            Some(Action::TurnLeft) if left > 0.1 => Action::TurnLeft,
-            Some(Action::TurnRight) if right > 0.1 => Action::TurnRight,
+            Some(Action::TurnLeft) if left > 0.5 * right => Action::TurnLeft,
+            Some(Action::TurnRight) if right > 0.5 * left => Action::TurnRight,
             _ if left >= right => Action::TurnLeft,
             _ => Action::TurnRight,
         };
@@ -175,7 +192,8 @@ impl Frontier {
         viewpoints: &[(usize, (usize, usize))],
         likeness: &Likeness,
     ) -> Option<Viewpoint> {
-        if self.at_target(view)
+        self.patience = self.patience.saturating_sub(1);
+        if (self.at_target(view) || self.patience == 0)
             && let Some(target) = self.target.take()
         {
             self.barren.push(target.place);
@@ -189,22 +207,30 @@ impl Frontier {
             }
             let at = view.map.geometry.centre(column, row);
             let travel_m = f64::from(view.travel_m[view.map.geometry.index(column, row)]);
-            let places = self.coverage.in_sight(view.map, at, likeness.range_m);
+            let places = self.coverage.in_sight(view.map, (column, row), likeness.range_m);
             let gain_m2 = self.coverage.gain_m2(&places, self.config.unknown_worth);
             if gain_m2 < self.config.gain_min_m2 {
                 continue;
             }
             let favour = hinted(view.hints, at, self.config.hint_rad);
-            let utility = gain_m2 * favour / (travel_m + self.config.way_offset_m);
+            let turns = view.pose.bearing_to(at.0, at.1).abs() / self.config.turn_rad;
+            let cost_m = travel_m + self.config.way_offset_m + self.config.turn_cost_m * turns;
+            let utility = gain_m2 * favour / cost_m;
             self.candidates.push(Viewpoint { x_m: at.0, y_m: at.1, place, gain_m2, utility });
         }
         self.candidates.sort_by(|a, b| b.utility.total_cmp(&a.utility).then(a.place.cmp(&b.place)));
         let best = self.candidates.first().copied();
         let kept = self.target.and_then(|t| self.candidates.iter().find(|c| c.place == t.place).copied());
+        let before = self.target.map(|t| t.place);
         self.target = match (kept, best) {
             (Some(kept), Some(best)) if kept.utility * self.config.hysteresis >= best.utility => Some(kept),
             (_, best) => best,
         };
+        if let Some(target) = self.target.filter(|t| Some(t.place) != before) {
+            let travel_m = view.travel_m
+                [view.map.geometry.cell_at(target.x_m, target.y_m).map_or(0, |(c, r)| view.map.geometry.index(c, r))];
+            self.patience = PATIENCE + (8.0 * travel_m) as u32;
+        }
         self.candidates.truncate(24);
         self.target
     }
