@@ -17,7 +17,7 @@ pub enum PoseSolver {
 /// When a goal counts as seen. All errors are angles, so that the same gates fit every camera.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct Gates {
-    /// n_th: fewest verified matches of a sighting (SLING 3.4).
+    /// n_th: fewest matches that agree on a pose (SLING 3.4), counted before guided matching adds to them.
     pub n_inliers_min: usize,
     /// Smallest share of the matches that a pose must explain.
     pub inlier_share_min: f64,
@@ -32,10 +32,10 @@ pub struct Gates {
 impl Default for Gates {
     fn default() -> Self {
         Self {
-            n_inliers_min: 15,
-            inlier_share_min: 0.15,
+            n_inliers_min: 10,
+            inlier_share_min: 0.1,
             error_rad_max: 0.008,
-            n_bearing_min: 30,
+            n_bearing_min: 25,
             bearing_share_min: 0.4,
         }
     }
@@ -52,6 +52,9 @@ pub struct PerceptionConfig {
     pub depth: DepthModel,
     /// One standard deviation of a keypoint's position, pixels.
     pub keypoint_sd_px: f64,
+    /// One standard deviation of what the intrinsics and the depth's scale are off by, as a share (0.005 is half a
+    /// percent). It widens the covariance of every pose: by this share of the mean depth, and by as many radians.
+    pub calibration_sd: f64,
     /// Pose solver.
     pub solver: PoseSolver,
     /// When a goal counts as seen.
@@ -60,6 +63,8 @@ pub struct PerceptionConfig {
     pub confidence: f64,
     /// Most samples RANSAC draws.
     pub iterations_max: usize,
+    /// Rounds of guided matching after the first pose: the second looks from the pose the first one refined.
+    pub guided_rounds: u32,
     /// Seed of RANSAC's samples; each frame mixes its stamp into it.
     pub seed: u64,
     /// Threads OpenCV may use, for the whole process; `None` leaves its own choice. Results do not depend on it.
@@ -73,10 +78,12 @@ impl Default for PerceptionConfig {
             ratio_max: 0.85,
             depth: DepthModel::default(),
             keypoint_sd_px: 0.7,
+            calibration_sd: 0.005,
             solver: PoseSolver::default(),
             gates: Gates::default(),
             confidence: 0.9999,
             iterations_max: 10_000,
+            guided_rounds: 2,
             seed: 0,
             threads: None,
         }
@@ -97,12 +104,14 @@ impl PerceptionConfig {
             ("depth.sd_m", self.depth.sd_m, (0.0, 1.0), "0..=1 m"),
             ("depth.sd_per_m2", self.depth.sd_per_m2, (0.0, 1.0), "0..=1 /m"),
             ("keypoint_sd_px", self.keypoint_sd_px, (0.01, 20.0), "0.01..=20 px"),
+            ("calibration_sd", self.calibration_sd, (0.0, 1.0), "0..=1"),
             ("n_inliers_min", g.n_inliers_min as f64, (4.0, 10_000.0), "4..=10000"),
             ("inlier_share_min", g.inlier_share_min, (0.0, 1.0), "0..=1"),
             ("error_rad_max", g.error_rad_max, (1e-5, 0.2), "0.00001..=0.2 rad"),
             ("n_bearing_min", g.n_bearing_min as f64, (6.0, 10_000.0), "6..=10000"),
             ("bearing_share_min", g.bearing_share_min, (0.0, 1.0), "0..=1"),
             ("confidence", self.confidence, (0.5, 1.0 - 1e-12), "0.5..1"),
+            ("guided_rounds", f64::from(self.guided_rounds), (0.0, 10.0), "0..=10"),
             ("iterations_max", self.iterations_max as f64, (1.0, 1e7), "1..=10000000"),
         ];
         for (name, value, (low, high), range) in rules {

@@ -8,11 +8,15 @@
 
 mod config;
 mod error;
+pub mod essential;
 pub mod estimator;
+mod guided;
 pub mod lift;
 mod locate;
 pub mod matching;
+pub mod photo;
 pub mod pnp;
+pub mod provider;
 pub mod sift;
 
 pub use config::{Gates, PerceptionConfig, PoseSolver};
@@ -20,4 +24,6 @@ pub use error::PerceptionError;
 pub use estimator::GoalEstimator;
 pub use lift::DepthModel;
 pub use matching::MutualNearest;
+pub use photo::{FieldOfView, Photo, PhotoError, decode_photo};
+pub use provider::{RuntimeError, RuntimeReport, load_runtime};
 pub use sift::{Sift, SiftConfig};

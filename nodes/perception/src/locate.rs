@@ -3,15 +3,21 @@
 use std::collections::BTreeSet;
 
 use homing_core::{DepthImage, FeatureMatch, Features, Intrinsics, Sighting, UnseenReason};
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Matrix6, Point3, Unit, Vector3, Vector6};
 use rand::Rng;
 
 use crate::PerceptionError;
 use crate::config::{PerceptionConfig, PoseSolver};
+use crate::essential::{EssentialConfig, RayPair, bearing};
+use crate::guided::{Scene, guided_matches, similarity};
 use crate::lift::lift;
 use crate::pnp::{
     CameraPose, Correspondence, EPNP_GATE_PX, PoseEstimate, RansacConfig, covariance, epnp_ransac, lo_ransac, refine,
 };
+
+/// Radius of the search around a prediction, in units of the inlier gate: the first pose may be off by more than the
+/// noise of a keypoint.
+const GUIDED_WINDOW: f64 = 1.5;
 
 /// Everything known about the two images.
 pub(crate) struct Views<'a> {
@@ -39,26 +45,104 @@ pub(crate) fn locate(
     if views.query.keypoints.len().min(views.goal.keypoints.len()) < n_min {
         return Ok(unseen(UnseenReason::NoTexture));
     }
-    let matches = distinct(views, matches);
+    let matches = distinct(views, matches.iter().map(|m| (m.query, m.goal)));
     if matches.len() < n_min {
         return Ok(unseen(UnseenReason::TooFewMatches));
     }
-    let (pairs, correspondences): (Vec<_>, Vec<_>) =
-        matches.iter().filter_map(|&pair| Some((pair, views.correspondence(pair, config)?))).unzip();
+    let (pairs, correspondences) = views.correspondences(&matches, config);
     if let Some(estimate) = solve(views, &correspondences, config, rng)? {
-        return Ok(found_pose(&pairs, &estimate));
+        return Ok(match config.solver {
+            PoseSolver::LoRansac => guided_pose(views, &pairs, estimate, config),
+            PoseSolver::EpnpRansac => found_pose(&pairs, &estimate),
+        });
+    }
+    // Depth is missing where it matters: fewer than half of the matches could be lifted.
+    if 2 * pairs.len() < matches.len()
+        && let Some(found) = found_bearing(views, &matches, config)?
+    {
+        return Ok(found);
     }
     Ok(unseen(UnseenReason::NoConsensus))
 }
 
+/// The goal's direction from rays alone, `None` unless it passes the gates.
+fn found_bearing(
+    views: &Views<'_>,
+    pairs: &[(usize, usize)],
+    config: &PerceptionConfig,
+) -> Result<Option<Found>, PerceptionError> {
+    let rays: Vec<RayPair> = pairs
+        .iter()
+        .map(|&(q, g)| RayPair { query: ray(views.camera, &views.query.keypoints[q]), goal: views.goal_ray(g) })
+        .collect();
+    let sd_px = config.keypoint_sd_px;
+    let essential = EssentialConfig {
+        gate_rad: config.gates.error_rad_max,
+        confidence: config.confidence,
+        iterations_max: five_point_samples(config),
+        ray_sd_rad: sd_px * (views.camera.fx().powi(-2) + views.goal_camera.fx().powi(-2)).sqrt(),
+    };
+    let Some(estimate) = bearing(&rays, &essential)? else { return Ok(None) };
+    let n_inliers = estimate.inliers.len();
+    let enough = n_inliers >= config.gates.n_bearing_min
+        && n_inliers as f64 >= config.gates.bearing_share_min * pairs.len() as f64;
+    Ok(enough.then(|| Found {
+        sighting: Sighting::Bearing {
+            bearing_rad: estimate.bearing_rad,
+            bearing_sd_rad: estimate.bearing_sd_rad,
+            heading_rad: estimate.heading_rad,
+            n_inliers,
+        },
+        verified: estimate.inliers.iter().map(|&i| pairs[i]).collect(),
+    }))
+}
+
+/// Samples that find the essential matrix if the smallest share of interest agrees with it. OpenCV's own stopping rule
+/// ends earlier where more do; a five-point sample costs some hundred times a three-point one.
+fn five_point_samples(config: &PerceptionConfig) -> usize {
+    let all_inliers = config.gates.bearing_share_min.powi(5).clamp(1e-6, 0.99);
+    let needed = nalgebra::ComplexField::ln(1.0 - config.confidence) / nalgebra::ComplexField::ln_1p(-all_inliers);
+    (needed.ceil() as usize).clamp(1, config.iterations_max)
+}
+
+/// Matches once more where the pose says to look, and refines on what is found.
+fn guided_pose(views: &Views<'_>, pairs: &[(usize, usize)], first: PoseEstimate, config: &PerceptionConfig) -> Found {
+    let similarity_min = weakest_of_most(views, first.inliers.iter().map(|&i| pairs[i]));
+    let points: Vec<_> = (0..views.query.keypoints.len()).filter_map(|q| Some((q, views.point(q, config)?))).collect();
+    let goal_rays: Vec<_> = (0..views.goal.keypoints.len()).map(|g| views.goal_ray(g).into_inner()).collect();
+    let scene = Scene { query: views.query, goal: views.goal, points: &points, goal_rays: &goal_rays };
+    let mut best = found_pose(pairs, &first);
+    let mut pose = first.pose;
+    let mut n_best = first.inliers.len();
+    for _ in 0..config.guided_rounds {
+        let found = guided_matches(&scene, &pose, GUIDED_WINDOW * config.gates.error_rad_max, similarity_min);
+        let (pairs, correspondences) = views.correspondences(&distinct(views, found.into_iter()), config);
+        let inliers = pose.inliers(&correspondences, GUIDED_WINDOW * config.gates.error_rad_max);
+        pose = refine(&pose, &correspondences, &inliers, 20);
+        let Some(estimate) = verified(pose, &correspondences, config) else { break };
+        if estimate.inliers.len() < n_best {
+            break;
+        }
+        n_best = estimate.inliers.len();
+        best = found_pose(&pairs, &estimate);
+    }
+    best
+}
+
+/// Similarity that nine in ten of the verified pairs reach.
+fn weakest_of_most(views: &Views<'_>, pairs: impl Iterator<Item = (usize, usize)>) -> f32 {
+    let mut similarities: Vec<f32> = pairs.map(|pair| similarity(views.query, views.goal, pair)).collect();
+    similarities.sort_by(f32::total_cmp);
+    similarities.get(similarities.len() / 10).copied().unwrap_or(1.0)
+}
+
 /// SIFT describes one point once per orientation: such twins are one observation, not two.
-fn distinct(views: &Views<'_>, matches: &[FeatureMatch]) -> Vec<(usize, usize)> {
+fn distinct(views: &Views<'_>, pairs: impl Iterator<Item = (usize, usize)>) -> Vec<(usize, usize)> {
     let cell = |features: &Features, i: usize| {
         let k = &features.keypoints[i];
         ((2.0 * k.x_px).round() as i32, (2.0 * k.y_px).round() as i32)
     };
     let mut seen = BTreeSet::new();
-    let pairs = matches.iter().map(|m| (m.query, m.goal));
     pairs.filter(|&(q, g)| seen.insert((cell(views.query, q), cell(views.goal, g)))).collect()
 }
 
@@ -71,6 +155,15 @@ impl Views<'_> {
     /// Point of a query keypoint, camera frame, if its depth can be trusted.
     pub(crate) fn point(&self, q: usize, config: &PerceptionConfig) -> Option<Point3<f64>> {
         lift(&self.query.keypoints[q], self.depth, self.camera, &config.depth)
+    }
+
+    /// The pairs whose query keypoint has a trusted depth, and what they mean.
+    fn correspondences(
+        &self,
+        pairs: &[(usize, usize)],
+        config: &PerceptionConfig,
+    ) -> (Vec<(usize, usize)>, Vec<Correspondence>) {
+        pairs.iter().filter_map(|&pair| Some((pair, self.correspondence(pair, config)?))).unzip()
     }
 
     fn correspondence(&self, (q, g): (usize, usize), config: &PerceptionConfig) -> Option<Correspondence> {
@@ -96,12 +189,11 @@ fn solve(
     config: &PerceptionConfig,
     rng: &mut impl Rng,
 ) -> Result<Option<PoseEstimate>, PerceptionError> {
-    let gate_rad = config.gates.error_rad_max;
     let pose = match config.solver {
         PoseSolver::LoRansac => robust_pose(correspondences, config, rng),
         PoseSolver::EpnpRansac => epnp_ransac(correspondences, EPNP_GATE_PX / views.goal_camera.fx())?,
     };
-    Ok(pose.and_then(|pose| verified(pose, correspondences, config, gate_rad)))
+    Ok(pose.and_then(|pose| verified(pose, correspondences, config)))
 }
 
 fn robust_pose(
@@ -120,13 +212,8 @@ fn robust_pose(
 }
 
 /// The pose with its support and certainty, if it explains enough of the correspondences.
-fn verified(
-    pose: CameraPose,
-    correspondences: &[Correspondence],
-    config: &PerceptionConfig,
-    gate_rad: f64,
-) -> Option<PoseEstimate> {
-    let inliers = pose.inliers(correspondences, gate_rad);
+fn verified(pose: CameraPose, correspondences: &[Correspondence], config: &PerceptionConfig) -> Option<PoseEstimate> {
+    let inliers = pose.inliers(correspondences, config.gates.error_rad_max);
     let enough = inliers.len() >= config.gates.n_inliers_min
         && inliers.len() as f64 >= config.gates.inlier_share_min * correspondences.len() as f64;
     if !enough {
@@ -134,8 +221,17 @@ fn verified(
     }
     let squared: f64 = inliers.iter().map(|&i| pose.squared_error(&correspondences[i])).sum();
     let rms_rad = (squared / inliers.len() as f64).sqrt();
-    let covariance = covariance(&pose, correspondences, &inliers)?;
+    let covariance =
+        covariance(&pose, correspondences, &inliers)? + calibration_floor(correspondences, &inliers, config);
     Some(PoseEstimate { pose, covariance, inliers, rms_rad })
+}
+
+/// What no number of matches averages out: an error of the intrinsics or of the depth's scale shifts all points alike.
+fn calibration_floor(correspondences: &[Correspondence], inliers: &[usize], config: &PerceptionConfig) -> Matrix6<f64> {
+    let mean_m = inliers.iter().map(|&i| correspondences[i].point.coords.norm()).sum::<f64>() / inliers.len() as f64;
+    let turn = config.calibration_sd * config.calibration_sd;
+    let shift = turn * mean_m * mean_m;
+    Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn))
 }
 
 fn found_pose(pairs: &[(usize, usize)], estimate: &PoseEstimate) -> Found {

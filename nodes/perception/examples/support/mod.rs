@@ -16,6 +16,7 @@ pub type Fallible<T> = Result<T, Box<dyn Error>>;
 pub struct PosedFrame {
     pub number: u64,
     pub frame: RgbdFrame,
+    #[allow(dead_code, reason = "each example uses its own part of this module")]
     pub t_world_camera: Isometry3<f64>,
 }
 
@@ -77,6 +78,7 @@ fn read_pose(path: &Path) -> Fallible<Isometry3<f64>> {
 }
 
 /// The value below which `share` of the sorted values lie.
+#[allow(dead_code, reason = "each example uses its own part of this module")]
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     if sorted.is_empty() { f64::NAN } else { sorted[((sorted.len() - 1) as f64 * share).round() as usize] }
 }

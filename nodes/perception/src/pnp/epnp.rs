@@ -48,7 +48,7 @@ fn solve(points: &Vector<Point3d>, pixels: &Vector<Point2d>, gate: f64) -> openc
         gate as f32,
         EPNP_CONFIDENCE,
         &mut inliers,
-        SOLVEPNP_EPNP as i32,
+        SOLVEPNP_EPNP,
     )?;
     if !found || inliers.empty() {
         return Ok(None);
