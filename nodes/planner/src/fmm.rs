@@ -1,11 +1,13 @@
 //! Fast Marching (Sethian 1996; SLING appendix A): arrival times of a front that moves slower where driving costs more.
 
-use core::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use homing_core::GridGeometry;
 
 use crate::terrain::Window;
+
+/// Buckets in the ring; with buckets of 0.7 cells they hold delays of 700 cells, more than any one cell may cost.
+const N_BUCKETS: usize = 1024;
+/// A cell may not cost more than this many free ones.
+const COST_MAX: f32 = 500.0;
 
 /// When to stop marching.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -26,16 +28,17 @@ pub enum Until {
 pub struct Marcher {
     geometry: GridGeometry,
     arrival: Vec<f32>,
-    // Keys are the bits of a non-negative time, which order as the times do, above the cell's index. A cell may be queued
-    // more than once; only the entry that still agrees with its time counts.
-    queue: BinaryHeap<Reverse<u64>>,
+    // A front that crosses a cell in `step` at the fastest reaches no neighbour sooner than `step / sqrt(2)` later. So the
+    // cells of one bucket that wide do not depend on each other, and no order is needed among them: a ring of buckets does
+    // what a heap would, without sorting. A cell may lie in several buckets; only the one of its time counts.
+    buckets: Vec<Vec<u32>>,
 }
 
 impl Marcher {
     /// For grids of one geometry.
     #[must_use]
     pub fn new(geometry: GridGeometry) -> Self {
-        Self { geometry, arrival: vec![f32::INFINITY; geometry.len()], queue: BinaryHeap::new() }
+        Self { geometry, arrival: vec![f32::INFINITY; geometry.len()], buckets: vec![Vec::new(); N_BUCKETS] }
     }
 
     /// The grid it marches over.
@@ -51,40 +54,57 @@ impl Marcher {
     }
 
     /// Marches from `source` (a cell's index) inside `window`, which must keep one cell off the grid's border. `cost` gives
-    /// the front's slowness in a cell; infinite closes it.
+    /// the front's slowness in a cell, at least 1; infinite closes it.
     pub fn march(&mut self, source: usize, window: &Window, until: Until, cost: impl Fn(usize) -> f32) {
         self.arrival.fill(f32::INFINITY);
-        self.queue.clear();
+        self.buckets.iter_mut().for_each(Vec::clear);
         let width = self.geometry.width;
-        if !window.contains(source % width, source / width) {
+        if source >= self.arrival.len() || !window.contains(source % width, source / width) {
             return;
         }
         self.arrival[source] = 0.0;
-        self.queue.push(Reverse(source as u64));
-        let step_m = self.geometry.resolution_m as f32;
-        while let Some(Reverse(entry)) = self.queue.pop() {
-            let (time, index) = (f32::from_bits((entry >> 32) as u32), (entry & 0xffff_ffff) as usize);
-            if time > self.arrival[index] {
-                continue;
-            }
-            if let Until::Reached { index: goal, beyond } = until
-                && time > self.arrival[goal] + beyond
+        self.buckets[0].push(source as u32);
+        let bucket_m = 0.7 * self.geometry.resolution_m as f32;
+        let (mut now, mut n_empty) = (0_usize, 0);
+        let mut cells = Vec::new();
+        while n_empty < N_BUCKETS {
+            core::mem::swap(&mut cells, &mut self.buckets[now % N_BUCKETS]);
+            n_empty = if cells.is_empty() { n_empty + 1 } else { 0 };
+            let begins = now as f32 * bucket_m;
+            if let Until::Reached { index, beyond } = until
+                && begins > self.arrival[index] + beyond
             {
                 break;
             }
-            let (column, row) = (index % width, index / width);
-            for (neighbour, c, r) in [
-                (index - 1, column - 1, row),
-                (index + 1, column + 1, row),
-                (index - width, column, row - 1),
-                (index + width, column, row + 1),
-            ] {
-                if self.arrival[neighbour] <= time || !window.contains(c, r) {
-                    continue;
+            for index in cells.drain(..) {
+                let index = index as usize;
+                if self.bucket_of(index, bucket_m) == now {
+                    self.spread(index, window, bucket_m, &cost);
                 }
+            }
+            now += 1;
+        }
+    }
+
+    fn bucket_of(&self, index: usize, bucket_m: f32) -> usize {
+        (self.arrival[index] / bucket_m) as usize
+    }
+
+    /// The front passes a cell: its neighbours get their times from it.
+    #[inline]
+    fn spread(&mut self, index: usize, window: &Window, bucket_m: f32, cost: &impl Fn(usize) -> f32) {
+        let width = self.geometry.width;
+        let (column, row, time) = (index % width, index / width, self.arrival[index]);
+        for (neighbour, inside) in [
+            (index - 1, column > window.column_min),
+            (index + 1, column + 1 < window.column_max),
+            (index - width, row > window.row_min),
+            (index + width, row + 1 < window.row_max),
+        ] {
+            if inside && self.arrival[neighbour] > time {
                 let slowness = cost(neighbour);
                 if slowness < f32::INFINITY {
-                    self.relax(neighbour, slowness * step_m);
+                    self.relax(neighbour, slowness.clamp(1.0, COST_MAX) * self.geometry.resolution_m as f32, bucket_m);
                 }
             }
         }
@@ -92,7 +112,7 @@ impl Marcher {
 
     /// First-order upwind solution of |grad T| = cost at one cell.
     #[inline]
-    fn relax(&mut self, index: usize, delay: f32) {
+    fn relax(&mut self, index: usize, delay: f32, bucket_m: f32) {
         let width = self.geometry.width;
         let along = self.arrival[index - 1].min(self.arrival[index + 1]);
         let across = self.arrival[index - width].min(self.arrival[index + width]);
@@ -102,7 +122,8 @@ impl Marcher {
             if gap < delay { 0.5 * (near + far + (2.0 * delay * delay - gap * gap).sqrt()) } else { near + delay };
         if time < self.arrival[index] {
             self.arrival[index] = time;
-            self.queue.push(Reverse((u64::from(time.to_bits()) << 32) | index as u64));
+            let bucket = self.bucket_of(index, bucket_m) % N_BUCKETS;
+            self.buckets[bucket].push(index as u32);
         }
     }
 

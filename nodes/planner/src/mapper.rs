@@ -16,6 +16,8 @@ const BIN_M: f32 = 0.025;
 const PIXELS_MIN: u8 = 2;
 const HIT: i8 = 4;
 const HIT_FAR: i8 = 2;
+/// Beyond this a depth camera's error is about a cell, metres.
+const FAR_M: f32 = 4.0;
 const COUNT_MIN: i8 = -6;
 const COUNT_MAX: i8 = 8;
 const OCCUPIED_FROM: i8 = 2;
@@ -240,32 +242,40 @@ impl Mapper {
     }
 
     fn mark_hits(&mut self, projection: &Projection, pose: &PlanarPose) {
-        let geometry = self.grid.geometry;
-        let (sin, cos) = (libm::sinf(pose.yaw_rad as f32), libm::cosf(pose.yaw_rad as f32));
-        let [cx, cy, _] = projection.camera_m;
-        let n_bins = self.fan.n_bins;
+        let width_rad = core::f32::consts::TAU / projection.n_sectors as f32;
+        let cell_m = self.grid.geometry.resolution_m as f32;
         for sector in 0..projection.n_sectors {
-            let azimuth = azimuth_of(sector, projection.n_sectors);
-            let (ray_sin, ray_cos) = (libm::sinf(azimuth), libm::cosf(azimuth));
-            for bin in 0..n_bins {
+            for bin in 0..self.fan.n_bins {
                 if !self.fan.is_hit(sector, bin) {
                     continue;
                 }
                 let range = (bin as f32 + 0.5) * BIN_M;
-                let (bx, by) = (cx + range * ray_cos, cy + range * ray_sin);
-                let (x, y) = (pose.x_m as f32 + bx * cos - by * sin, pose.y_m as f32 + bx * sin + by * cos);
-                let Some((column, row)) = geometry.cell_at(f64::from(x), f64::from(y)) else { continue };
-                let index = geometry.index(column, row);
-                if self.hit_in_frame[index] == self.frame || self.counts[index] == BUMPED {
-                    continue;
-                }
-                self.hit_in_frame[index] = self.frame;
-                let hit = if range < 4.0 { HIT } else { HIT_FAR };
-                self.counts[index] = (self.counts[index] + hit).min(COUNT_MAX);
-                if self.counts[index] >= OCCUPIED_FROM {
-                    self.set(column, row, index, Cell::Occupied);
+                // A sector wider than a cell must not leave gaps in a wall.
+                let n_across = (range * width_rad / cell_m).ceil().clamp(1.0, 8.0) as usize;
+                for i in 0..n_across {
+                    let share = (i as f32 + 0.5) / n_across as f32 - 0.5;
+                    self.hit(projection, pose, azimuth_of(sector, projection.n_sectors) + share * width_rad, range);
                 }
             }
+        }
+    }
+
+    /// Something stands in the way at a range from the camera; counts once per frame and cell.
+    fn hit(&mut self, projection: &Projection, pose: &PlanarPose, azimuth_rad: f32, range_m: f32) {
+        let [cx, cy, _] = projection.camera_m;
+        let (sin, cos) = (libm::sinf(pose.yaw_rad as f32), libm::cosf(pose.yaw_rad as f32));
+        let (bx, by) = (cx + range_m * libm::cosf(azimuth_rad), cy + range_m * libm::sinf(azimuth_rad));
+        let (x, y) = (pose.x_m as f32 + bx * cos - by * sin, pose.y_m as f32 + bx * sin + by * cos);
+        let Some((column, row)) = self.grid.geometry.cell_at(f64::from(x), f64::from(y)) else { return };
+        let index = self.grid.geometry.index(column, row);
+        if self.hit_in_frame[index] == self.frame || self.counts[index] == BUMPED {
+            return;
+        }
+        self.hit_in_frame[index] = self.frame;
+        let hit = if range_m < FAR_M { HIT } else { HIT_FAR };
+        self.counts[index] = (self.counts[index] + hit).min(COUNT_MAX);
+        if self.counts[index] >= OCCUPIED_FROM {
+            self.set(column, row, index, Cell::Occupied);
         }
     }
 
