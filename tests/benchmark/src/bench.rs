@@ -1,0 +1,126 @@
+//! Many flats, one episode each.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use homing_core::GoalDiscovery;
+use homing_perception::PerceptionConfig;
+use homing_planner::{Frontier, PlannerConfig, Straight};
+use homing_sim::arena::{Arena, BodySize, SceneRef};
+use homing_sim::episode::{self, EpisodeSpec};
+use serde::{Deserialize, Serialize};
+
+use crate::episode::{StageSeconds, run_episode};
+use crate::report::{BenchReport, EpisodeRow};
+use crate::{RunError, Watch};
+
+/// Goal-discovery policies.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Policy {
+    /// Straight ahead, right when blocked (SLING's simplest).
+    Straight,
+    /// To where most of what was never looked at comes into sight.
+    #[default]
+    Frontier,
+}
+
+impl Policy {
+    /// A fresh policy.
+    #[must_use]
+    pub fn build(self) -> Box<dyn GoalDiscovery> {
+        match self {
+            Policy::Straight => Box::new(Straight::new()),
+            Policy::Frontier => Box::new(Frontier::default()),
+        }
+    }
+}
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct BenchOptions {
+    /// Goal discovery.
+    pub policy: Policy,
+    /// Kind of episode.
+    pub spec: EpisodeSpec,
+    /// Episodes at a time; 0 for one per core.
+    pub threads: usize,
+    /// Perception's settings. OpenCV gets one thread per episode, whatever they say.
+    pub perception: PerceptionConfig,
+    /// The planner's settings.
+    pub planner: PlannerConfig,
+}
+
+impl Default for BenchOptions {
+    /// The benchmark: Frontier, curved episodes of 3 to 10 m.
+    fn default() -> Self {
+        Self {
+            policy: Policy::default(),
+            spec: EpisodeSpec::default(),
+            threads: 0,
+            perception: PerceptionConfig::default(),
+            planner: PlannerConfig::default(),
+        }
+    }
+}
+
+/// Runs the episode of each seed in the flat of that seed. `progress` hears of every episode as it ends, in any order;
+/// the report lists them by seed, and but for its times is the same whatever the number of threads.
+///
+/// # Errors
+/// [`RunError`] of the first seed, in their order, whose episode could not be run.
+pub fn bench(
+    seeds: &[u64],
+    options: &BenchOptions,
+    progress: &(dyn Fn(&EpisodeRow) + Sync),
+) -> Result<BenchReport, RunError> {
+    let n_threads = match options.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    };
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::new());
+    let worker = || -> Result<(), RunError> {
+        // A pool of its own keeps the renderer's work on this thread: whole episodes side by side use the cores better
+        // than the tiles of one picture, and a thread that waits for tiles must not begin another episode.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        while let Some(&seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let result = pool.install(|| run_seed(seed, options));
+            if let Ok((row, _)) = &result {
+                progress(row);
+            }
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((seed, result));
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..n_threads.min(seeds.len().max(1))).map(|_| scope.spawn(worker)).collect();
+        workers.into_iter().try_for_each(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })?;
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_by_key(|(seed, _)| *seed);
+    let rows: Vec<(EpisodeRow, StageSeconds)> = done.into_iter().map(|(_, r)| r).collect::<Result<_, _>>()?;
+    Ok(BenchReport::new(options, rows))
+}
+
+fn run_seed(seed: u64, options: &BenchOptions) -> Result<(EpisodeRow, StageSeconds), RunError> {
+    let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
+    let episode = episode::draw(&arena, seed, &options.spec)?;
+    let mut watch = Watch::default();
+    let run = run_episode(
+        &arena,
+        &episode,
+        PerceptionConfig { threads: Some(1), ..options.perception },
+        options.planner.clone(),
+        options.policy.build(),
+        &mut |record| watch.see(&arena, &episode, record),
+    )?;
+    let row = EpisodeRow {
+        seed,
+        cause: (!run.score.success).then(|| watch.cause(run.mode)),
+        score: run.score,
+        reason: run.reason,
+        watch,
+    };
+    Ok((row, run.times))
+}

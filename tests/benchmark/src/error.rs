@@ -1,0 +1,34 @@
+//! Why an episode could not be run.
+
+use homing_core::{BridgeError, IntrinsicsError};
+use homing_perception::PerceptionError;
+use homing_planner::ConfigError;
+use homing_sim::arena::ArenaError;
+use homing_sim::episode::DrawError;
+use thiserror::Error;
+
+/// A fault of the benchmark or its parts; a goal that is not reached is none.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The scene cannot be used.
+    #[error("the scene cannot be used: {0}")]
+    Arena(#[from] ArenaError),
+    /// The scene offers no episode of this kind.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The goal's camera cannot be.
+    #[error("the goal camera cannot be: {0}")]
+    Camera(#[from] IntrinsicsError),
+    /// Perception failed.
+    #[error("perception: {0}")]
+    Perception(#[from] PerceptionError),
+    /// The planner's knobs are impossible.
+    #[error("planner settings: {0}")]
+    Planner(#[from] ConfigError),
+    /// The simulated body failed.
+    #[error("the body: {0}")]
+    Body(#[from] BridgeError),
+    /// No thread to work on.
+    #[error("no worker threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}

@@ -1,0 +1,16 @@
+//! The benchmark: whole episodes in one process, in lockstep, and what came of them.
+//!
+//! [`episode::run_episode`] is the distributed system's loop without its network: the same events, so the same actions.
+//! [`bench::bench`] runs one episode in each of many generated flats, scores it strictly and says why it failed if it did.
+
+pub mod bench;
+pub mod cause;
+pub mod episode;
+mod error;
+pub mod report;
+
+pub use bench::{BenchOptions, Policy, bench};
+pub use cause::{Cause, Watch};
+pub use episode::{EpisodeRun, StepRecord, run_episode};
+pub use error::RunError;
+pub use report::{BenchReport, EpisodeRow};
