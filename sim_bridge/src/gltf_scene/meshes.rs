@@ -89,7 +89,7 @@ fn read_primitive(
 }
 
 fn check_extent(name: &str, positions: &[[f32; 3]]) -> Result<(), SceneError> {
-    match positions.iter().flatten().find(|c| !(c.abs() <= EXTENT_MAX_M)) {
+    match positions.iter().flatten().find(|c| c.is_nan() || c.abs() > EXTENT_MAX_M) {
         Some(c) => Err(too_large(name, "a coordinate", format!("{c} m"), format!("{EXTENT_MAX_M} m"))),
         None => Ok(()),
     }

@@ -103,9 +103,9 @@ impl Chart {
     #[inline]
     pub fn at(&self, s: f32, t: f32) -> [f32; 4] {
         let (s, t) = (s.max(0.0).min((self.width - 1) as f32), t.max(0.0).min((self.height - 1) as f32));
-        let (i, j) = ((s as usize).min(self.width - 2), (t as usize).min(self.height - 2));
-        let (fs, ft) = (s - i as i32 as f32, t - j as i32 as f32);
-        let below = j * self.width + i;
+        let (i, j) = ((s as i32).min(self.width as i32 - 2), (t as i32).min(self.height as i32 - 2));
+        let (fs, ft) = (s - i as f32, t - j as f32);
+        let below = (j * self.width as i32 + i) as usize;
         let (a, b) = (self.values[below], self.values[below + 1]);
         let (c, d) = (self.values[below + self.width], self.values[below + self.width + 1]);
         core::array::from_fn(|k| {

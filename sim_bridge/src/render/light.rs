@@ -133,3 +133,48 @@ pub fn unit(v: [f32; 3]) -> [f32; 3] {
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     if length > 1e-12 { v.map(|c| c / length) } else { [0.0; 3] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Mesh, Vertex};
+
+    const UP: [f32; 3] = [0.0, 0.0, 1.0];
+
+    fn sheet(corners: [[f32; 3]; 4]) -> Mesh {
+        let vertex = |position: [f32; 3]| Vertex { position, normal: UP, uv: [0.0; 2] };
+        Mesh {
+            vertices: corners.map(vertex).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            solid: true,
+            ..Mesh::default()
+        }
+    }
+
+    /// A floor, a table of 1 m at (0, 0), a wall at x = 2 up to 2.5 m, a lamp at (0.3, 0, 2.3).
+    fn scene() -> Scene {
+        let flat = |h: f32, z: f32| sheet([[-h, -h, z], [h, -h, z], [h, h, z], [-h, h, z]]);
+        let wall = sheet([[2.0, -4.0, 0.0], [2.0, 4.0, 0.0], [2.0, 4.0, 2.5], [2.0, -4.0, 2.5]]);
+        let lamp = Lamp { position: [0.3, 0.0, 2.3], colour: [1.0; 3], reach_m: 7.0 };
+        Scene { meshes: vec![flat(4.0, 0.0), flat(0.5, 0.75), wall], lamps: vec![lamp], ..Scene::default() }
+    }
+
+    fn at(scene: &Scene, x: f32, y: f32) -> f32 {
+        Light::new(scene).irradiance(&Place { position: [x, y, 0.0], normal: UP }, false)[0]
+    }
+
+    #[test]
+    fn furniture_and_walls_throw_shadows() {
+        let scene = scene();
+        assert!(at(&scene, 0.0, 0.0) < 0.6 * at(&scene, 0.0, 1.2), "below the table");
+        // Both are 2.5 m from the lamp.
+        assert!(at(&scene, 2.8, 0.0) < at(&scene, -2.2, 0.0) - 0.08, "behind the wall");
+    }
+
+    #[test]
+    fn corners_are_darker_than_the_open_floor() {
+        let dark = Scene { lamps: vec![], ..scene() };
+        assert!(at(&dark, 1.95, 3.0) < 0.9 * at(&dark, -2.0, 3.0));
+        assert!((at(&dark, -2.0, 3.0) - 0.95).abs() < 1e-3);
+    }
+}

@@ -66,14 +66,18 @@ impl MipTexture {
     /// (red in the lowest 16 bits, then blue, green, alpha).
     #[inline]
     pub fn trilinear(&self, u: f32, v: f32, lod: f32) -> u64 {
-        let last = self.levels.len() - 1;
-        let lod = (lod * ONE as f32).clamp(0.0, (last as i32 * ONE) as f32) as i32;
-        let (below, blend) = ((lod >> FRACTION_BITS) as usize, lod & (ONE - 1));
-        let near = self.levels[below].bilinear(u, v);
-        if blend < 8 || below == last {
-            return near;
+        let last = self.levels.len() as i32 - 1;
+        // Only the middle half of the way between two levels is blended: half of the pixels need one level alone.
+        let lod = lod.max(0.0).min(last as f32);
+        let below = lod as i32;
+        let blend = (2.0 * (lod - below as f32) - 0.5).clamp(0.0, 1.0);
+        let weight = (blend * ONE as f32) as i32;
+        let near = below + i32::from(weight == ONE);
+        if weight == 0 || near > below {
+            return self.levels[near as usize].bilinear(u, v);
         }
-        lerp_wide(near, self.levels[below + 1].bilinear(u, v), blend as u64)
+        let far = self.levels[near as usize + 1].bilinear(u, v);
+        lerp_wide(self.levels[near as usize].bilinear(u, v), far, weight as u64)
     }
 
     /// Alpha, 0 to 1, at the level given (bilinear, no blend between levels).
@@ -110,6 +114,9 @@ impl Level {
 
     #[inline]
     fn bilinear(&self, u: f32, v: f32) -> u64 {
+        if let [only] = self.texels[..] {
+            return spread(only) << FRACTION_BITS;
+        }
         // The bias is whole repeats of any texture: it needs not be taken off again.
         let x = (u * self.scale_x + HALF_TEXEL) as i32;
         let y = (v * self.scale_y + HALF_TEXEL) as i32;

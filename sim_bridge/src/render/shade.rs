@@ -5,8 +5,10 @@ use crate::render::mip::MipTexture;
 use crate::render::raster::{Band, NOTHING};
 use crate::render::setup::{Bins, Plane, ScreenTriangle};
 
-/// Probes along the longer axis of a pixel's footprint, at most: floors at a grazing angle stay sharp.
-const PROBES_MAX: f32 = 4.0;
+/// Footprints longer than this many times their width (squared) are averaged from two probes along the longer axis, and
+/// from four: floors at a grazing angle stay sharp.
+const TWO_PROBES2: f32 = 1.5 * 1.5;
+const FOUR_PROBES2: f32 = 3.0 * 3.0;
 
 /// What is seen where no surface is.
 const BACKGROUND: [u8; 3] = [168, 186, 206];
@@ -25,9 +27,9 @@ struct Footprint {
     v: f32,
     /// Longer axis, texture repeats.
     major: (f32, f32),
-    /// Lengths of both axes, texels.
-    long: f32,
-    short: f32,
+    /// Squared lengths of both axes, texels.
+    long2: f32,
+    short2: f32,
 }
 
 impl<'a> Texturing<'a> {
@@ -49,7 +51,7 @@ impl<'a> Texturing<'a> {
     pub fn alpha(&self, column: i32, row: i32, q: f32) -> f32 {
         let (x, y) = (f64::from(column), f64::from(row));
         let f = self.footprint(self.u.at(x, y) as f32, self.v.at(x, y) as f32, 1.0 / q);
-        self.texture.alpha(f.u, f.v, log2(f.short.max(1.0)))
+        self.texture.alpha(f.u, f.v, 0.5 * log2(f.short2.max(1.0)))
     }
 
     /// `u_z`, `v_z` are u/z and v/z; derivatives of u = (u/z) / (1/z) by the quotient rule.
@@ -59,39 +61,35 @@ impl<'a> Texturing<'a> {
         let (qx, qy) = (self.q.x as f32, self.q.y as f32);
         let (ux, vx) = ((self.u.x as f32 - u * qx) * z, (self.v.x as f32 - v * qx) * z);
         let (uy, vy) = ((self.u.y as f32 - u * qy) * z, (self.v.y as f32 - v * qy) * z);
-        let length = |du: f32, dv: f32| {
+        let length2 = |du: f32, dv: f32| {
             let (a, b) = (du * self.texture.width, dv * self.texture.height);
-            (a * a + b * b).sqrt()
+            a * a + b * b
         };
-        let (along_x, along_y) = (length(ux, vx), length(uy, vy));
+        let (along_x, along_y) = (length2(ux, vx), length2(uy, vy));
         if along_x >= along_y {
-            Footprint { u, v, major: (ux, vx), long: along_x, short: along_y }
+            Footprint { u, v, major: (ux, vx), long2: along_x, short2: along_y }
         } else {
-            Footprint { u, v, major: (uy, vy), long: along_y, short: along_x }
+            Footprint { u, v, major: (uy, vy), long2: along_y, short2: along_x }
         }
     }
 
     /// Filtered colour in lanes of value * 256.
     #[inline]
     fn sample(&self, f: &Footprint) -> u64 {
-        if f.long <= 1.0 {
+        if f.long2 <= 1.0 {
             return self.texture.trilinear(f.u, f.v, 0.0);
         }
-        let probes = (f.long / f.short.max(1e-6) + 0.5).min(PROBES_MAX) as i32;
-        match probes {
-            0 | 1 => self.texture.trilinear(f.u, f.v, log2(f.long)),
-            2 | 3 => {
-                let lod = log2(f.long * 0.5);
-                let (du, dv) = (f.major.0 * 0.25, f.major.1 * 0.25);
-                let a = self.texture.trilinear(f.u - du, f.v - dv, lod);
-                mean(a, self.texture.trilinear(f.u + du, f.v + dv, lod))
-            }
-            _ => {
-                let lod = log2(f.long * 0.25);
-                let at = |share: f32| self.texture.trilinear(f.u + f.major.0 * share, f.v + f.major.1 * share, lod);
-                mean(mean(at(-0.375), at(-0.125)), mean(at(0.125), at(0.375)))
-            }
+        // Half the logarithm of a squared length: no root is needed.
+        let lod = 0.5 * log2(f.long2);
+        if f.long2 < TWO_PROBES2 * f.short2 {
+            return self.texture.trilinear(f.u, f.v, lod);
         }
+        let at = |share: f32, lod: f32| self.texture.trilinear(f.u + f.major.0 * share, f.v + f.major.1 * share, lod);
+        if f.long2 < FOUR_PROBES2 * f.short2 {
+            return mean(at(-0.25, lod - 1.0), at(0.25, lod - 1.0));
+        }
+        let lod = lod - 2.0;
+        mean(mean(at(-0.375, lod), at(-0.125, lod)), mean(at(0.125, lod), at(0.375, lod)))
     }
 }
 
@@ -173,7 +171,7 @@ fn run(
         };
         let lit = |lane: u32, light: f32| {
             let value = ((colour >> lane) & 0xffff) as i32 as f32;
-            (value * (light * (1.0 / 256.0)) + 0.5).max(0.0).min(255.0) as i32 as u8
+            (value * (light * (1.0 / 256.0)) + 0.5).clamp(0.0, 255.0) as i32 as u8
         };
         rgb.copy_from_slice(&[lit(0, red), lit(32, green), lit(16, blue)]);
     }

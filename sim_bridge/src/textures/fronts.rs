@@ -83,8 +83,11 @@ fn panel(canvas: &mut Canvas, (x0, y0): (f32, f32), (x1, y1): (f32, f32)) {
     canvas.alter((x0, y0), (x1, y1), |x, y, old| {
         let sides = [x - x0, x1 - x, y - y0, y1 - y];
         let nearest = sides.iter().copied().fold(f32::MAX, f32::min);
-        if nearest > BEVEL || nearest < 0.0 {
-            return shade(old, if nearest < 0.0 { 1.0 } else { 1.03 });
+        if nearest < 0.0 {
+            return old;
+        }
+        if nearest > BEVEL {
+            return shade(old, 1.03);
         }
         shade(old, if nearest == sides[2] || nearest == sides[0] { 0.72 } else { 1.22 })
     });
