@@ -6,6 +6,7 @@ pub mod constants;
 pub mod episode;
 pub mod flat;
 pub mod follower;
+pub mod free_space;
 pub mod geodesic;
 pub mod gltf_scene;
 pub mod laser;
@@ -16,3 +17,9 @@ pub mod scene;
 pub mod score;
 pub mod simulator;
 pub mod textures;
+
+pub use arena::{Arena, ArenaError, BodySize, SceneRef};
+pub use episode::{Episode, EpisodeSpec, Viewpoint};
+pub use laser::LaserConfig;
+pub use score::{Finish, Score};
+pub use simulator::{SimConfig, Simulator};

@@ -262,7 +262,8 @@ impl RobotBridge for Simulator {
             }
             Motion::Stop { done } => {
                 self.stopped = self.stopped || done;
-                self.moving(0.0, |_, _| Travel { path_m: 0.0, blocked: false })
+                // Standing takes time too: the next observation has a stamp of its own.
+                self.moving(self.config.velocity_s, |_, _| Travel { path_m: 0.0, blocked: false })
             }
         };
         self.speed = (0.0, 0.0);

@@ -20,6 +20,20 @@ pub enum Action {
     Hold,
 }
 
+impl Action {
+    /// The motion that carries it out, with steps of `forward_m` metres and `turn_rad` radians.
+    #[must_use]
+    pub fn motion(self, forward_m: f64, turn_rad: f64) -> Motion {
+        match self {
+            Action::Forward => Motion::Forward { distance_m: forward_m },
+            Action::TurnLeft => Motion::Turn { angle_rad: turn_rad },
+            Action::TurnRight => Motion::Turn { angle_rad: -turn_rad },
+            Action::Stop => Motion::Stop { done: true },
+            Action::Hold => Motion::Stop { done: false },
+        }
+    }
+}
+
 /// One motion of the body.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub enum Motion {

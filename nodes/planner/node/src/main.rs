@@ -1,2 +1,73 @@
-//! homing-planner-node
-fn main() {}
+//! The planning process: observations and goal estimates in, motion commands out.
+
+mod config;
+mod drive;
+mod links;
+mod moment;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Parser;
+use homing_planner::Planner;
+use homing_protocol::Session;
+use homing_protocol::navigate::NavigateServer;
+use homing_protocol::process::{self, EXIT_CONFIG};
+
+use crate::config::Config;
+use crate::drive::Driver;
+use crate::links::Links;
+
+/// Drives a robot to the place where a photo was taken.
+#[derive(Parser)]
+#[command(name = "homing-planner", version)]
+struct Args {
+    /// The process's TOML file; see deploy/.
+    #[arg(long)]
+    config: PathBuf,
+}
+
+fn main() -> ExitCode {
+    process::start_log();
+    let config: Config = match process::read_config(&Args::parse().config) {
+        Ok(config) => config,
+        Err(cause) => {
+            tracing::error!("{cause}");
+            return ExitCode::from(EXIT_CONFIG);
+        }
+    };
+    match run(config) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(cause) => {
+            tracing::error!("{cause:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[tokio::main]
+async fn run(config: Config) -> anyhow::Result<()> {
+    tracing::info!(?config, "effective configuration");
+    let planner = Planner::new(config.planner(), config.policy.build()).context("planner cannot start")?;
+    let session = Session::open(&config.session.session("planner"))?;
+    let links = Links::open(&session)?;
+    let missions = NavigateServer::announce(&session)?;
+    tracing::info!(policy = planner.policy(), "planner is ready");
+
+    let mut driver = Driver::new(planner, config, links, missions);
+    let stop = process::termination();
+    tokio::pin!(stop);
+    loop {
+        tokio::select! {
+            () = &mut stop => break,
+            () = driver.hear(&session) => {}
+        }
+        tokio::task::block_in_place(|| driver.act(&session))?;
+    }
+    // The robot stands before its planner leaves.
+    driver.halt();
+    tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    session.close();
+    Ok(())
+}

@@ -1,2 +1,56 @@
-//! homing-robot-node
-fn main() {}
+//! A recorded body: plays RGB-D frames on the topics of a robot, in lockstep with perception.
+
+mod config;
+mod play;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use homing_protocol::Session;
+use homing_protocol::process::{self, EXIT_CONFIG};
+use homing_robot::replay::{Recording, ReplayBody};
+
+use crate::config::Config;
+
+/// Plays a recording as if a robot were driving: the same topics, real images, nothing to drive.
+#[derive(Parser)]
+#[command(name = "homing-robot", version)]
+struct Args {
+    /// The process's TOML file; see deploy/.
+    #[arg(long)]
+    config: PathBuf,
+}
+
+fn main() -> ExitCode {
+    process::start_log();
+    let config: Config = match process::read_config(&Args::parse().config) {
+        Ok(config) => config,
+        Err(cause) => {
+            tracing::error!("{cause}");
+            return ExitCode::from(EXIT_CONFIG);
+        }
+    };
+    match run(config) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(cause) => {
+            tracing::error!("{cause:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[tokio::main]
+async fn run(config: Config) -> anyhow::Result<()> {
+    tracing::info!(?config, "effective configuration");
+    let session = Session::open(&config.session.session("body"))?;
+    let recording = Recording::open(&config.recording)?;
+    let frames = if config.frames.is_empty() { recording.numbers().collect() } else { config.frames };
+    let body = ReplayBody::with_playlist(recording, frames)?;
+    tokio::select! {
+        played = play::run(&session, body, config.answers) => played?,
+        () = process::termination() => {}
+    }
+    session.close();
+    Ok(())
+}

@@ -1,0 +1,152 @@
+//! The process's TOML file.
+
+use std::time::Duration;
+
+use homing_core::GoalDiscovery;
+use homing_planner::{Frontier, PlannerConfig, Straight};
+use homing_protocol::process::SessionSettings;
+use serde::Deserialize;
+
+/// `planner.toml`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Network.
+    pub session: SessionSettings,
+    /// Goal discovery.
+    pub policy: Policy,
+    /// The map.
+    pub map: MapSettings,
+    /// The body.
+    pub body: BodySettings,
+    /// Switches and budget.
+    pub mission: MissionSettings,
+    /// Waiting.
+    pub pace: PaceSettings,
+}
+
+/// Goal-discovery policies.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Policy {
+    /// Straight ahead, right when blocked (SLING's simplest).
+    Straight,
+    /// To the edges of what is known.
+    #[default]
+    Frontier,
+}
+
+impl Policy {
+    /// A fresh policy.
+    pub fn build(self) -> Box<dyn GoalDiscovery> {
+        match self {
+            Policy::Straight => Box::new(Straight::new()),
+            Policy::Frontier => Box::new(Frontier::default()),
+        }
+    }
+}
+
+/// `[map]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MapSettings {
+    /// Side of the square map, metres.
+    pub side_m: f64,
+    /// Side of a cell, metres.
+    pub resolution_m: f64,
+}
+
+/// `[body]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BodySettings {
+    /// Radius of the footprint, metres.
+    pub radius_m: f64,
+    /// One forward step, metres.
+    pub forward_m: f64,
+    /// One turn, degrees.
+    pub turn_deg: f64,
+}
+
+/// `[mission]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MissionSettings {
+    /// Decisions per mission.
+    pub step_budget: u64,
+}
+
+/// `[pace]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PaceSettings {
+    /// Longest wait for perception's answer to a frame before going on without it, milliseconds.
+    pub answer_ms_max: u64,
+    /// A command is sent again after so long without a result, milliseconds.
+    pub resend_ms: u64,
+    /// A command without a result is given up after so long, milliseconds.
+    pub result_ms_max: u64,
+    /// A command is void this long after the stamp of the observation it answers, milliseconds.
+    pub time_to_live_ms: u64,
+}
+
+impl Default for MapSettings {
+    fn default() -> Self {
+        let defaults = PlannerConfig::default();
+        Self { side_m: defaults.map_side_m, resolution_m: defaults.resolution_m }
+    }
+}
+
+impl Default for BodySettings {
+    fn default() -> Self {
+        let body = PlannerConfig::default().body;
+        Self { radius_m: body.radius_m, forward_m: body.forward_m, turn_deg: body.turn_rad.to_degrees() }
+    }
+}
+
+impl Default for MissionSettings {
+    fn default() -> Self {
+        Self { step_budget: PlannerConfig::default().step_budget }
+    }
+}
+
+impl Default for PaceSettings {
+    fn default() -> Self {
+        Self { answer_ms_max: 5_000, resend_ms: 250, result_ms_max: 15_000, time_to_live_ms: 3_000 }
+    }
+}
+
+impl PaceSettings {
+    pub fn answer_max(&self) -> Duration {
+        Duration::from_millis(self.answer_ms_max)
+    }
+
+    pub fn resend(&self) -> Duration {
+        Duration::from_millis(self.resend_ms.max(10))
+    }
+
+    pub fn result_max(&self) -> Duration {
+        Duration::from_millis(self.result_ms_max)
+    }
+
+    pub fn time_to_live(&self) -> Duration {
+        Duration::from_millis(self.time_to_live_ms)
+    }
+}
+
+impl Config {
+    /// As the library's configuration.
+    pub fn planner(&self) -> PlannerConfig {
+        let mut config = PlannerConfig::default();
+        config.map_side_m = self.map.side_m;
+        config.resolution_m = self.map.resolution_m;
+        config.body.radius_m = self.body.radius_m;
+        config.body.forward_m = self.body.forward_m;
+        // An untouched default keeps its bits: degrees would move the last one.
+        if self.body.turn_deg != config.body.turn_rad.to_degrees() {
+            config.body.turn_rad = self.body.turn_deg.to_radians();
+        }
+        config.step_budget = self.mission.step_budget;
+        config
+    }
+}

@@ -1,0 +1,302 @@
+//! One loop for lockstep and real time: hear, and when a moment is complete, step and command.
+
+use std::time::{Duration, Instant};
+
+use homing_core::{Action, Mode, Motion, MotionCommand, MotionResult, Stamp};
+use homing_planner::{Mission as PlannerMission, Perception, Planner, PlannerObservation, StepEvent};
+use homing_protocol::convert::{EncodedPhoto, ToDomain, ToMessage, to_camera_mount, to_depth};
+use homing_protocol::navigate::{Mission, MissionReport, NavigateServer, Outcome, Progress};
+use homing_protocol::{Session, topics};
+
+use crate::config::Config;
+use crate::links::Links;
+use crate::moment::Moments;
+
+/// How often the photo is sent again, for a perception that starts late.
+const GOAL_PERIOD: Duration = Duration::from_secs(1);
+/// The loop looks at its clocks at least this often.
+const TICK: Duration = Duration::from_millis(20);
+/// Once perception let a whole wait pass, it gets only this much per step until it answers again.
+const LATE_ANSWER_MAX: Duration = Duration::from_millis(20);
+/// The map is sent with every n-th step: it is for people.
+const MAP_EVERY: u64 = 5;
+
+/// Plans and drives.
+pub struct Driver {
+    planner: Planner,
+    config: Config,
+    links: Links,
+    missions: NavigateServer,
+    moments: Moments,
+    session_id: u64,
+    sequence: u64,
+    mission: Option<Active>,
+    announced: Option<PlannerMission>,
+    perception: Answering,
+}
+
+/// The mission under way.
+struct Active {
+    photo: EncodedPhoto,
+    photo_sent: Option<Instant>,
+    command: Option<Outstanding>,
+    result: Option<MotionResult>,
+    next_from: Stamp,
+    complete_since: Option<(Stamp, Instant)>,
+    path_length_m: f64,
+}
+
+/// A command that has no result yet.
+struct Outstanding {
+    command: MotionCommand,
+    first_sent: Instant,
+    last_sent: Instant,
+}
+
+#[derive(Copy, Clone, PartialEq, Eq, Debug)]
+enum Answering {
+    InTime,
+    Late,
+    Gone,
+}
+
+impl Driver {
+    pub fn new(planner: Planner, config: Config, links: Links, missions: NavigateServer) -> Self {
+        Self {
+            planner,
+            config,
+            links,
+            missions,
+            moments: Moments::default(),
+            session_id: rand::random(),
+            sequence: 0,
+            mission: None,
+            announced: None,
+            perception: Answering::InTime,
+        }
+    }
+
+    /// Takes in whatever arrives next; returns after [`TICK`] at the latest.
+    pub async fn hear(&mut self, _session: &Session) {
+        let links = &self.links;
+        let heard: anyhow::Result<()> = tokio::select! {
+            depth = links.depths.recv() => depth.map_err(Into::into)
+                .and_then(|d| { let (stamp, depth) = to_depth(&d.message)?; self.moments.depth(stamp, depth); Ok(()) }),
+            info = links.infos.recv() => info.map_err(Into::into)
+                .and_then(|i| { let i = i.message.to_domain()?; self.moments.intrinsics(i.stamp, i.intrinsics); Ok(()) }),
+            odometry = links.odometry.recv() => odometry.map_err(Into::into)
+                .and_then(|o| { self.moments.odometry(o.message.to_domain()?); Ok(()) }),
+            mount = links.mounts.recv() => mount.map_err(Into::into)
+                .and_then(|m| { if let Some(mount) = to_camera_mount(&m.message)? { self.moments.mount(mount); } Ok(()) }),
+            estimate = links.estimates.recv() => estimate.map_err(Into::into).and_then(|e| {
+                let goal_id = self.mission.as_ref().map_or(0, |m| m.photo.id);
+                self.moments.estimate(e.message.to_domain()?, goal_id);
+                Ok(())
+            }),
+            result = links.results.recv() => result.map_err(Into::into)
+                .and_then(|r| { let result = r.message.to_domain()?; settle(&mut self.mission, result); Ok(()) }),
+            mission = self.missions.next() => { begin(self, mission); Ok(()) }
+            () = tokio::time::sleep(TICK) => Ok(()),
+        };
+        if let Err(cause) = heard {
+            tracing::warn!("ignored: {cause:#}");
+        }
+    }
+
+    /// Sends what is due, and steps when a moment is complete.
+    pub fn act(&mut self, session: &Session) -> anyhow::Result<()> {
+        self.send_photo()?;
+        self.send_again()?;
+        if let Some((observation, perception)) = self.complete_moment(session) {
+            self.step(observation, perception)?;
+        }
+        Ok(())
+    }
+
+    /// Tells the body to stand still.
+    pub fn halt(&mut self) {
+        if self.mission.is_some() {
+            let stamp = self.planner.state().stamp;
+            let command = self.command(stamp, Motion::Stop { done: false });
+            if let Err(cause) = self.links.command.publish(&command.to_message()) {
+                tracing::error!(%cause, "the last stop was not sent; the body's own watchdog stops it");
+            }
+        }
+    }
+
+    fn send_photo(&mut self) -> anyhow::Result<()> {
+        let Some(active) = &mut self.mission else { return Ok(()) };
+        if active.photo_sent.is_none_or(|at| at.elapsed() >= GOAL_PERIOD) {
+            active.photo_sent = Some(Instant::now());
+            self.links.goal.publish(&active.photo.to_message())?;
+        }
+        Ok(())
+    }
+
+    fn send_again(&mut self) -> anyhow::Result<()> {
+        let Some(active) = &mut self.mission else { return Ok(()) };
+        let Some(outstanding) = &mut active.command else { return Ok(()) };
+        if outstanding.first_sent.elapsed() > self.config.pace.result_max() {
+            tracing::error!(sequence = outstanding.command.sequence, "the body gave no result; going on without it");
+            active.next_from = Stamp(outstanding.command.stamp.0 + 1);
+            active.command = None;
+        } else if outstanding.last_sent.elapsed() >= self.config.pace.resend() {
+            outstanding.last_sent = Instant::now();
+            self.links.command.publish(&outstanding.command.to_message())?;
+        }
+        Ok(())
+    }
+
+    /// The newest moment, once everything that belongs to it is here or has been waited for long enough.
+    fn complete_moment(&mut self, session: &Session) -> Option<(PlannerObservation, Perception)> {
+        let active = self.mission.as_mut()?;
+        if active.command.is_some() {
+            return None;
+        }
+        let observation = self.moments.newest(active.next_from)?;
+        let stamp = observation.odometry.stamp;
+        let since = match active.complete_since {
+            Some((at, since)) if at == stamp => since,
+            _ => {
+                active.complete_since = Some((stamp, Instant::now()));
+                Instant::now()
+            }
+        };
+        let (answering, perception) = if self.moments.answered(stamp) {
+            (Answering::InTime, Perception::Present)
+        } else if !session.has_sender(&topics::GOAL_ESTIMATE) {
+            (Answering::Gone, Perception::Absent)
+        } else {
+            let wait = if self.perception == Answering::Late { LATE_ANSWER_MAX } else { self.config.pace.answer_max() };
+            if since.elapsed() < wait {
+                return None;
+            }
+            (Answering::Late, Perception::Absent)
+        };
+        if answering != self.perception {
+            tracing::warn!(now = ?answering, "perception's answers");
+            self.perception = answering;
+        }
+        Some((observation, perception))
+    }
+
+    fn step(&mut self, observation: PlannerObservation, perception: Perception) -> anyhow::Result<()> {
+        let stamp = observation.odometry.stamp;
+        let Some(active) = &mut self.mission else { return Ok(()) };
+        let motion = active.result.take().map(|r| r.outcome);
+        active.path_length_m += motion.map_or(0.0, |m| m.moved.distance_to(0.0, 0.0));
+        let event = StepEvent {
+            mission: self.announced.take(),
+            estimate: self.moments.close(stamp),
+            observation: Some(observation),
+            motion,
+            perception,
+        };
+        let action = self.planner.step(stamp, &event);
+        self.show()?;
+        self.carry_out(stamp, action)
+    }
+
+    fn carry_out(&mut self, stamp: Stamp, action: Action) -> anyhow::Result<()> {
+        let state = self.planner.state();
+        let (mode, reason) = (state.mode, state.reason.clone());
+        if let Some(outcome) = ended(mode, action) {
+            // Only a goal that is believed reached is declared; a planner that gave up just stands.
+            let command = self.command(stamp, Motion::Stop { done: outcome == Outcome::Arrived });
+            self.links.command.publish(&command.to_message())?;
+            self.finish(outcome, reason);
+            return Ok(());
+        }
+        let body = self.config.planner().body;
+        let command = self.command(stamp, action.motion(body.forward_m, body.turn_rad));
+        self.links.command.publish(&command.to_message())?;
+        if let Some(active) = &mut self.mission {
+            let now = Instant::now();
+            active.command = Some(Outstanding { command, first_sent: now, last_sent: now });
+        }
+        Ok(())
+    }
+
+    fn command(&mut self, stamp: Stamp, motion: Motion) -> MotionCommand {
+        self.sequence += 1;
+        MotionCommand {
+            session: self.session_id,
+            epoch: 0,
+            sequence: self.sequence,
+            stamp,
+            time_to_live: self.config.pace.time_to_live(),
+            motion,
+        }
+    }
+
+    fn show(&self) -> anyhow::Result<()> {
+        let state = self.planner.state();
+        self.links.state.publish(&state.to_message())?;
+        let last = matches!(state.mode, Mode::Arrived | Mode::Failed);
+        if state.step % MAP_EVERY == 1 || last {
+            self.links.map.publish(&(state.stamp, self.planner.map()).to_message())?;
+        }
+        let distance = |goal: &homing_core::GoalHypothesis| state.pose.distance_to(goal.pose.x_m, goal.pose.y_m);
+        self.missions.progress(&Progress {
+            step: state.step,
+            mode: state.mode,
+            goal_distance_m: state.goal.as_ref().map(distance),
+            reason: state.reason.clone(),
+        });
+        Ok(())
+    }
+
+    fn finish(&mut self, outcome: Outcome, message: String) {
+        let Some(active) = self.mission.take() else { return };
+        tracing::info!(?outcome, message, "mission ended");
+        self.missions.finish(&MissionReport {
+            outcome,
+            steps: self.planner.state().step,
+            path_length_m: active.path_length_m,
+            message,
+        });
+    }
+}
+
+fn ended(mode: Mode, action: Action) -> Option<Outcome> {
+    match (mode, action) {
+        (Mode::Arrived, _) => Some(Outcome::Arrived),
+        (Mode::Failed, _) | (_, Action::Stop) => Some(Outcome::Failed),
+        _ => None,
+    }
+}
+
+fn settle(mission: &mut Option<Active>, result: MotionResult) {
+    let Some(active) = mission else { return };
+    let answers = |o: &Outstanding| o.command.session == result.session && o.command.sequence == result.sequence;
+    if active.command.as_ref().is_some_and(answers) {
+        active.command = None;
+        active.next_from = result.outcome.stamp;
+        active.result = Some(result);
+    }
+}
+
+fn begin(driver: &mut Driver, mission: Option<Mission>) {
+    match mission {
+        Some(Mission::Start(photo)) => {
+            tracing::info!(goal = photo.id, "mission begins");
+            driver.moments.clear();
+            driver.announced = Some(PlannerMission::Start { goal_id: photo.id });
+            driver.perception = Answering::InTime;
+            driver.mission = Some(Active {
+                photo,
+                photo_sent: None,
+                command: None,
+                result: None,
+                next_from: Stamp(0),
+                complete_since: None,
+                path_length_m: 0.0,
+            });
+        }
+        Some(Mission::Cancel) => {
+            driver.halt();
+            driver.finish(Outcome::Cancelled, "cancelled by the operator".to_owned());
+        }
+        None => {}
+    }
+}

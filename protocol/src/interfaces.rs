@@ -1,0 +1,15 @@
+//! The ROS 2 interfaces on the wire: our own, generated from `msg/`, `srv/` and `action/`, and ROS's.
+
+#[expect(
+    missing_docs,
+    clippy::all,
+    clippy::unwrap_used,
+    unused_imports,
+    reason = "generated from .msg files, which hold the documentation"
+)]
+mod generated {
+    include!(concat!(env!("OUT_DIR"), "/generated.rs"));
+}
+
+pub use generated::ros::homing_msgs;
+pub use hiroz_msgs::ros::{builtin_interfaces, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, tf2_msgs};

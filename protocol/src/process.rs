@@ -1,0 +1,120 @@
+//! What every process does at its start and end: read its one configuration file, say what holds, and stop when told.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use thiserror::Error;
+use tracing_subscriber::EnvFilter;
+
+use crate::session::{DEFAULT_ENDPOINT, Link, SessionConfig};
+
+/// Exit code for a configuration that cannot be used (EX_CONFIG of sysexits).
+pub const EXIT_CONFIG: u8 = 78;
+
+/// Why a configuration cannot be used.
+#[derive(Debug, Error)]
+pub enum ConfigFileError {
+    /// The file cannot be read.
+    #[error("cannot read the configuration {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is not TOML, or has a key that does not exist.
+    #[error("configuration {}: {cause}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line, key and reason.
+        cause: toml::de::Error,
+    },
+}
+
+/// Reads one TOML file. Unknown keys are errors if the type says `deny_unknown_fields`.
+///
+/// # Errors
+/// [`ConfigFileError`] with file, line, key and reason.
+pub fn read_config<T: DeserializeOwned>(path: &Path) -> Result<T, ConfigFileError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| ConfigFileError::Read { path: path.to_owned(), source })?;
+    toml::from_str(&text).map_err(|cause| ConfigFileError::Parse { path: path.to_owned(), cause })
+}
+
+/// The `[session]` table of every process.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SessionSettings {
+    /// Listen here and forward between the others: the body only.
+    pub listen: Option<Vec<String>>,
+    /// Connect to the body here.
+    pub connect: Option<Vec<String>>,
+    /// Robot namespace; empty for a lone robot.
+    pub namespace: String,
+    /// ROS domain.
+    pub domain: usize,
+    /// Hand large messages to processes of this host through shared memory.
+    pub shared_memory: bool,
+    /// Give up after so many seconds without the body.
+    pub connect_timeout_s: u64,
+}
+
+impl Default for SessionSettings {
+    fn default() -> Self {
+        Self {
+            listen: None,
+            connect: None,
+            namespace: String::new(),
+            domain: 0,
+            shared_memory: true,
+            connect_timeout_s: 10,
+        }
+    }
+}
+
+impl SessionSettings {
+    /// As a session of `node`: whoever does not listen connects, to the default endpoint if none is named.
+    #[must_use]
+    pub fn session(&self, node: &str) -> SessionConfig {
+        let link = match &self.listen {
+            Some(endpoints) => Link::Listen(endpoints.clone()),
+            None => Link::Connect(self.connect.clone().unwrap_or_else(|| vec![DEFAULT_ENDPOINT.to_owned()])),
+        };
+        SessionConfig {
+            node: node.to_owned(),
+            namespace: self.namespace.clone(),
+            domain: self.domain,
+            link,
+            connect_timeout: Duration::from_secs(self.connect_timeout_s),
+            shared_memory: self.shared_memory,
+        }
+    }
+}
+
+/// Log lines go to stderr; RUST_LOG overrides what is shown.
+pub fn start_log() {
+    let filter = EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| EnvFilter::new("info,zenoh=error,zenoh_transport=error,zenoh_shm=error,hiroz=error"));
+    // A second call in one process changes nothing.
+    let _ =
+        tracing_subscriber::fmt().with_env_filter(filter).with_target(false).with_writer(std::io::stderr).try_init();
+}
+
+/// Waits for Ctrl-C or SIGTERM.
+pub async fn termination() {
+    let mut terminate = match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
+        Ok(stream) => stream,
+        Err(cause) => {
+            tracing::error!(%cause, "cannot listen for SIGTERM; Ctrl-C still works");
+            let _ = tokio::signal::ctrl_c().await;
+            return;
+        }
+    };
+    tokio::select! {
+        _ = tokio::signal::ctrl_c() => {}
+        _ = terminate.recv() => {}
+    }
+}
