@@ -2,7 +2,7 @@
 //!
 //! Straight drives forward and turns right once whenever it came less than 0.10 m (SLING, `navigate.py`). As soon as the
 //! goal is within 4 m and in line of sight, an oracle takes over and follows the shortest path to it, which no perception
-//! can better. `straight_share FIRST LAST [--json]`, seeds 1000 to 1099 unless given, one flat each.
+//! can better. `straight_share FIRST LAST`, seeds 1000 to 1099 unless given, one flat each.
 
 use std::sync::Arc;
 

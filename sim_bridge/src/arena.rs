@@ -9,9 +9,10 @@ use thiserror::Error;
 
 use crate::constants::{HEIGHT_M, LASER_HEIGHT_M, RADIUS_M};
 use crate::flat::{self, Detail, Rect};
+use crate::free_space::FreeSpace;
 use crate::gltf_scene::{self, SceneError};
 use crate::laser::LaserSlice;
-use crate::nav_grid::{FreeSpace, NavGrid, NavGridError};
+use crate::nav_grid::{NavGrid, NavGridError};
 use crate::render::{Render, Renderer};
 use crate::scene::{Scene, World};
 

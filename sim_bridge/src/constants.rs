@@ -26,7 +26,7 @@ pub const SUCCESS_M: f64 = 1.0;
 pub const CURVED_RATIO: f64 = 1.2;
 /// ... or if start and goal headings differ by at least this, radians (45 degrees; NRNS).
 pub const CURVED_HEADING_RAD: f64 = 45.0 * PI / 180.0;
-/// Median depth of a goal view must exceed this, metres, so that no photo shows a bare wall from close by.
+/// Median depth along the horizon of a goal view must exceed this, metres, so that no photo shows a bare wall from close by.
 pub const GOAL_DEPTH_M_MIN: f64 = 0.6;
 /// Height of the laser scanner above the floor, metres.
 pub const LASER_HEIGHT_M: f64 = 0.3;

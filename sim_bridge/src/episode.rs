@@ -12,6 +12,7 @@ use crate::constants::{
     CAMERA_HEIGHT, CAMERA_HEIGHT_M, CAMERA_HFOV_RAD, CAMERA_WIDTH, CURVED_HEADING_RAD, CURVED_RATIO, GOAL_DEPTH_M_MIN,
 };
 use crate::geodesic::GeodesicField;
+use crate::laser::LaserSlice;
 use crate::scene::World;
 
 /// Position and heading on the floor, world frame.
@@ -182,10 +183,12 @@ const GOALS_MAX: u32 = 60;
 const STARTS_MAX: u32 = 80;
 /// The arrival direction is taken over the last stretch of the path, metres: a follower's last steps.
 const ARRIVAL_M: f64 = 0.5;
+/// Nothing is farther than this, metres.
+const HORIZON_M: f64 = 60.0;
 
 /// Draws an episode after NRNS (`generate_test_instances.py`): start and goal uniform over the free space, start heading
 /// uniform, goal heading that in which a follower of the shortest path arrives, the photo taken there. One thing is
-/// added: goal views whose median depth is at most [`GOAL_DEPTH_M_MIN`] are drawn again, because a photo of bare wall
+/// added: goal views whose median depth along the horizon is at most [`GOAL_DEPTH_M_MIN`] are drawn again, because a photo of bare wall
 /// names no place.
 ///
 /// Equal arguments give equal episodes on every machine.
@@ -195,13 +198,14 @@ const ARRIVAL_M: f64 = 0.5;
 pub fn draw(arena: &Arena, seed: u64, spec: &EpisodeSpec) -> Result<Episode, DrawError> {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x6570_6973_6f64_6573);
     spec.camera.intrinsics()?;
+    let horizon = LaserSlice::new(arena.scene(), arena.grid().floor_z_m() + spec.camera.height_m);
     for _ in 0..GOALS_MAX {
         let Some(goal) = random_place(arena, rng) else { continue };
         let Ok(field) = GeodesicField::to(arena.space(), goal) else { continue };
         for _ in 0..STARTS_MAX {
             let candidate = candidate(arena, &field, goal, seed, spec, rng);
             if let Some(episode) = candidate
-                && shows_something(arena, &episode)?
+                && horizon_m(&horizon, episode.goal, &spec.camera) > GOAL_DEPTH_M_MIN
             {
                 return Ok(episode);
             }
@@ -278,12 +282,15 @@ fn arrival_yaw(path: &[(f64, f64)]) -> f64 {
     libm::atan2(end.1 - from.1, end.0 - from.0)
 }
 
-/// A small picture of the goal view is enough to know its median depth.
-fn shows_something(arena: &Arena, episode: &Episode) -> Result<bool, DrawError> {
-    let camera = episode.camera.intrinsics()?.resized(64, 48)?;
-    let t_world_camera = t_world_base(arena, episode.goal.into()) * episode.camera.t_base_camera();
-    let (_, depth) = arena.view(&camera, &t_world_camera);
-    let mut metres: Vec<f32> = depth.data().iter().copied().filter(|d| *d > 0.0).collect();
-    metres.sort_by(f32::total_cmp);
-    Ok(metres.get(metres.len() / 2).is_some_and(|d| f64::from(*d) > GOAL_DEPTH_M_MIN))
+/// Median depth along the horizon of the goal view: what the triangles cut at the camera's height are away.
+fn horizon_m(horizon: &LaserSlice, goal: FloorPose, camera: &Viewpoint) -> f64 {
+    let half_width = libm::tan(0.5 * camera.hfov_rad);
+    let depth = |k: u32| {
+        let across = libm::atan(half_width * (f64::from(k) - 31.5) / 31.5);
+        let range = horizon.range_m((goal.x_m, goal.y_m), goal.yaw_rad - across, HORIZON_M);
+        range.unwrap_or(HORIZON_M) * libm::cos(across)
+    };
+    let mut depths: Vec<f64> = (0..64).map(depth).collect();
+    depths.sort_by(f64::total_cmp);
+    depths[32]
 }

@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use thiserror::Error;
 
-use crate::nav_grid::FreeSpace;
+use crate::free_space::FreeSpace;
 
 /// Around the goal distances are exact up to this many cells, where a finite difference errs most.
 const EXACT_CELLS: i64 = 8;

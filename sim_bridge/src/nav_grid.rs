@@ -4,6 +4,7 @@ use homing_core::GridGeometry;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::free_space::FreeSpace;
 use crate::raster::{Corner, cells_under, clip_band, solid_triangles, triangles};
 use crate::scene::Scene;
 
@@ -148,99 +149,16 @@ impl NavGrid {
         true
     }
 
-    /// The largest connected set of places for a disc of that radius, metres.
+    /// The largest connected set of places for a disc of that radius, metres. `scene` is named in the error.
     ///
     /// # Errors
     /// [`NavGridError::NoFloor`] if there is less than a square metre of it.
     pub fn free_space(&self, scene: &str, radius_m: f64) -> Result<FreeSpace, NavGridError> {
-        let g = self.geometry;
-        let mut label = vec![0_u32; g.len()];
-        let mut sizes = vec![0_usize];
-        for seed in 0..g.len() {
-            if label[seed] == 0 && f64::from(self.clearance_m[seed]) > radius_m {
-                let n = flood(&mut label, seed, sizes.len() as u32, &g, |i| f64::from(self.clearance_m[i]) > radius_m);
-                sizes.push(n);
-            }
+        let space = FreeSpace::largest(self.geometry, &self.clearance_m, radius_m);
+        if space.area_m2() < FLOOR_M2_MIN {
+            return Err(NavGridError::NoFloor { scene: scene.to_owned(), radius_m, found_m2: space.area_m2() });
         }
-        // The first of equally large components wins.
-        let largest = (0..sizes.len()).rev().max_by_key(|i| sizes[*i]).unwrap_or(0);
-        let found_m2 = sizes[largest] as f64 * g.resolution_m * g.resolution_m;
-        if found_m2 < FLOOR_M2_MIN {
-            return Err(NavGridError::NoFloor { scene: scene.to_owned(), radius_m, found_m2 });
-        }
-        let free = label.iter().map(|l| *l as usize == largest).collect();
-        Ok(FreeSpace { geometry: g, radius_m, free, cells: sizes[largest] })
-    }
-}
-
-/// Where the centre of a robot of one radius can be and go.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FreeSpace {
-    geometry: GridGeometry,
-    radius_m: f64,
-    free: Vec<bool>,
-    cells: usize,
-}
-
-impl FreeSpace {
-    /// Where the grid lies, world frame.
-    #[must_use]
-    pub fn geometry(&self) -> &GridGeometry {
-        &self.geometry
-    }
-
-    /// Radius it was made for, metres.
-    #[must_use]
-    pub fn radius_m(&self) -> f64 {
-        self.radius_m
-    }
-
-    /// Square metres.
-    #[must_use]
-    pub fn area_m2(&self) -> f64 {
-        self.cells as f64 * self.geometry.resolution_m * self.geometry.resolution_m
-    }
-
-    /// One flag a cell, row-major: the robot can be at the cell's centre.
-    #[must_use]
-    pub fn cells(&self) -> &[bool] {
-        &self.free
-    }
-
-    /// True if the cell that holds the point, world frame, metres, is free.
-    #[must_use]
-    pub fn contains(&self, x_m: f64, y_m: f64) -> bool {
-        self.geometry.cell_at(x_m, y_m).is_some_and(|(c, r)| self.free[self.geometry.index(c, r)])
-    }
-
-    /// True if every cell on the straight line between two points is free.
-    #[must_use]
-    pub fn line_is_free(&self, from: (f64, f64), to: (f64, f64)) -> bool {
-        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-        let n = (libm::sqrt(dx * dx + dy * dy) / (0.4 * self.geometry.resolution_m)).ceil().max(1.0);
-        (0..=n as u32).all(|k| {
-            let s = f64::from(k) / n;
-            self.contains(from.0 + s * dx, from.1 + s * dy)
-        })
-    }
-
-    /// Centre of the `n`-th free cell, counted row by row, world frame, metres.
-    #[must_use]
-    pub fn nth(&self, n: usize) -> Option<(f64, f64)> {
-        let index = (0..self.free.len()).filter(|i| self.free[*i]).nth(n)?;
-        Some(self.geometry.centre(index % self.geometry.width, index / self.geometry.width))
-    }
-
-    /// Number of free cells.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.cells
-    }
-
-    /// Never true: a free space has at least a square metre.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.cells == 0
+        Ok(space)
     }
 }
 
@@ -340,27 +258,4 @@ fn nearest_squared(gaps: &[u32], column: usize, reach: usize) -> f64 {
         best = best.min(across + up * up);
     }
     best
-}
-
-fn flood(label: &mut [u32], seed: usize, name: u32, g: &GridGeometry, free: impl Fn(usize) -> bool) -> usize {
-    let mut stack = vec![seed];
-    label[seed] = name;
-    let mut n = 0;
-    while let Some(at) = stack.pop() {
-        n += 1;
-        let (column, row) = (at % g.width, at / g.width);
-        let near = [
-            (column > 0).then(|| at - 1),
-            (column + 1 < g.width).then_some(at + 1),
-            (row > 0).then(|| at - g.width),
-            (row + 1 < g.height).then_some(at + g.width),
-        ];
-        for next in near.into_iter().flatten() {
-            if label[next] == 0 && free(next) {
-                label[next] = name;
-                stack.push(next);
-            }
-        }
-    }
-    n
 }

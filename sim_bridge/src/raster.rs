@@ -74,7 +74,7 @@ fn extent(polygon: &[Corner], axis: usize) -> (f64, f64) {
 
 fn span(low: f64, high: f64, n: usize) -> Option<core::ops::RangeInclusive<usize>> {
     let (low, high) = (low.floor().max(0.0), high.floor().min(n as f64 - 1.0));
-    (low <= high).then(|| low as usize..=high as usize)
+    (low <= high).then_some(low as usize..=high as usize)
 }
 
 #[cfg(test)]

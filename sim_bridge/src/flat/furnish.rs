@@ -82,6 +82,7 @@ impl<'a> Furnishing<'a> {
             RoomKind::Storage => self.storage(rng),
             RoomKind::Corridor => self.corridor(rng),
         }
+        self.radiators(rng);
     }
 
     fn living(&mut self, rng: &mut ChaCha8Rng) {
@@ -91,22 +92,23 @@ impl<'a> Furnishing<'a> {
             self.stand(Piece::CoffeeTable, spot.shifted(0.0, 1.25));
             let across = self.room.floor.side_length(side);
             let along = across - self.room.floor.side(side).local(spot.x, spot.y).0;
-            self.at_wall(Piece::TvStand, side.opposite(), along);
+            if self.at_wall(Piece::TvStand, side.opposite(), along).is_none() {
+                self.against_a_wall(Piece::TvStand, rng);
+            }
         }
         self.several(&[Piece::Bookshelf(1.2), Piece::Armchair, Piece::Plant, Piece::FloorLamp], rng);
-        if self.room.floor.area() > 20.0 {
-            self.in_the_open(Piece::DiningSet(2), rng);
+        if self.room.floor.area() > 17.0 {
+            self.a_table(2, rng);
             self.several(&[Piece::Sideboard(1.4), Piece::Bookshelf(0.9), Piece::Armchair, Piece::Plant], rng);
         }
     }
 
     fn kitchen(&mut self, rng: &mut ChaCha8Rng) {
-        let width = [3.0, 2.4, 1.8].into_iter().find(|w| self.against_a_wall(Piece::Kitchen(*w), rng).is_some());
-        self.against_a_wall(Piece::Fridge, rng);
-        if width.is_some() {
-            self.in_the_open(Piece::DiningSet(if self.room.floor.area() > 13.0 { 3 } else { 2 }), rng);
-        }
-        self.several(&[Piece::Sideboard(1.2), Piece::Washer, Piece::Plant], rng);
+        let counters = [Piece::Kitchen(3.0), Piece::Kitchen(2.4), Piece::Counter(2.4), Piece::Counter(1.8)];
+        counters.into_iter().find(|piece| self.against_a_wall(*piece, rng).is_some());
+        self.several(&[Piece::Fridge], rng);
+        self.a_table(if self.room.floor.area() > 13.0 { 3 } else { 2 }, rng);
+        self.several(&[Piece::Counter(1.2), Piece::Sideboard(1.2), Piece::Washer, Piece::Plant], rng);
     }
 
     fn bedroom(&mut self, bed: f64, rng: &mut ChaCha8Rng) {
@@ -120,38 +122,65 @@ impl<'a> Furnishing<'a> {
             self.several(&[Piece::Desk, Piece::Bookshelf(0.9), Piece::Boxes], rng);
         }
         self.several(&[Piece::Wardrobe(1.65), Piece::Sideboard(1.2), Piece::Plant, Piece::Armchair], rng);
+        if self.room.floor.area() > 15.0 {
+            self.several(&[Piece::Desk, Piece::Bookshelf(0.9), Piece::FloorLamp, Piece::Wardrobe(1.1)], rng);
+        }
     }
 
     fn bath(&mut self, rng: &mut ChaCha8Rng) {
         self.several(&[Piece::Bath, Piece::Toilet, Piece::Basin, Piece::Washer], rng);
+        if self.room.floor.area() > 10.0 {
+            self.several(&[Piece::Wardrobe(1.1), Piece::Boxes, Piece::Sideboard(1.2), Piece::Plant], rng);
+        }
         self.lay_rug(Spot::new(self.room.floor.centre().0, self.room.floor.centre().1, 0), (0.9, 0.6));
     }
 
     fn study(&mut self, rng: &mut ChaCha8Rng) {
         self.several(&[Piece::Desk, Piece::Bookshelf(1.2), Piece::Bookshelf(1.2), Piece::Armchair], rng);
         self.several(&[Piece::Plant, Piece::FloorLamp, Piece::Sideboard(1.2)], rng);
+        if self.room.floor.area() > 15.0 {
+            self.several(&[Piece::Sofa(2), Piece::Bookshelf(1.2), Piece::Desk], rng);
+        }
         self.lay_rug(Spot::new(self.room.floor.centre().0, self.room.floor.centre().1, 0), (2.0, 1.4));
     }
 
     fn dining(&mut self, rng: &mut ChaCha8Rng) {
         let (x, y) = self.room.floor.centre();
         self.lay_rug(Spot::new(x, y, 0), (2.6, 1.9));
-        self.in_the_open(Piece::DiningSet(3), rng);
+        self.a_table(3, rng);
         self.several(&[Piece::Sideboard(1.6), Piece::Plant, Piece::Bookshelf(0.9), Piece::FloorLamp], rng);
+        self.several(&[Piece::Sideboard(1.2), Piece::Armchair], rng);
     }
 
     fn storage(&mut self, rng: &mut ChaCha8Rng) {
         self.several(&[Piece::Wardrobe(1.1), Piece::Boxes, Piece::Bookshelf(0.9), Piece::Washer, Piece::Boxes], rng);
-        self.several(&[Piece::Wardrobe(1.65), Piece::Sideboard(1.2)], rng);
+        self.several(&[Piece::Wardrobe(1.65), Piece::Sideboard(1.2), Piece::Bookshelf(1.2), Piece::Boxes], rng);
     }
 
     fn corridor(&mut self, rng: &mut ChaCha8Rng) {
-        let n = if self.room.floor.area() > 10.0 { 3 } else { 1 };
-        let stock = [Piece::ShoeCabinet, Piece::Plant, Piece::ShoeCabinet];
+        let n = if self.room.floor.area() > 9.0 { 4 } else { 2 };
+        let stock = [Piece::ShoeCabinet, Piece::Plant, Piece::Bookshelf(0.9), Piece::ShoeCabinet];
         self.several(&stock[..n], rng);
         let (x, y) = self.room.floor.centre();
-        let long = if self.room.floor.width() > self.room.floor.depth() { 0 } else { 1 };
-        self.lay_rug(Spot::new(x, y, long), (2.2, 0.7));
+        let along_y = usize::from(self.room.floor.width() <= self.room.floor.depth());
+        self.lay_rug(Spot::new(x, y, along_y), (2.2, 0.7));
+    }
+
+    /// The largest table that fits, with up to `chairs` along a side.
+    fn a_table(&mut self, chairs: u32, rng: &mut ChaCha8Rng) {
+        (1..=chairs).rev().find(|n| self.in_the_open(Piece::DiningSet(*n), rng).is_some());
+    }
+
+    /// A radiator below most windows that have nothing in front of them.
+    fn radiators(&mut self, rng: &mut ChaCha8Rng) {
+        for (k, side) in Side::ALL.into_iter().enumerate() {
+            let windows: Vec<Span> = self.spans[k].iter().copied().filter(|s| s.height.0 > 0.7).collect();
+            for window in windows {
+                if rng.random_bool(0.8) {
+                    self.at_wall(Piece::Radiator, side, 0.5 * (window.along.0 + window.along.1));
+                }
+            }
+        }
     }
 
     fn several(&mut self, pieces: &[Piece], rng: &mut ChaCha8Rng) {

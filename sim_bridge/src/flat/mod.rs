@@ -67,24 +67,24 @@ pub fn generate_as(seed: u64, detail: Detail) -> Flat {
     let style = Style::draw(rng);
     let scene = &mut SceneBuilder::default();
     for (room, walls) in plan.rooms.iter().zip(&walls) {
-        let look = style.room(room.kind, rng);
-        shell::build_room(scene, room, walls, &style, &look, height_m, rng);
-        furnish_room(scene, room, walls, &style, &look, rng);
+        build_room(scene, room, walls, &style, height_m, rng);
     }
     let scene = core::mem::take(scene).finish(format!("flat seed {seed}"), detail);
     Flat { seed, scene, rooms: plan.rooms, doors: plan.doors, height_m }
 }
 
-fn furnish_room(
+fn build_room(
     scene: &mut SceneBuilder,
     room: &Room,
     walls: &Walls,
     style: &Style,
-    look: &RoomStyle,
+    height_m: f64,
     rng: &mut ChaCha8Rng,
 ) {
+    let look = &style.room(room.kind, rng);
     let mut furnishing = Furnishing::new(room, walls);
     furnishing.furnish(rng);
+    shell::build_room(scene, room, walls, style, look, height_m, rng);
     for placed in &furnishing.placed {
         placed.piece.build(&mut scene.pen(placed.spot), style, look, rng);
     }

@@ -10,8 +10,8 @@ use super::pen::{Mapping, Pen};
 use super::style::{RoomStyle, Style, pick};
 use crate::scene::Lamp;
 
-/// Faces are cut into pieces no longer than this, metres, so that light varies along a wall.
-const PIECE_M: f64 = 1.0;
+/// Faces are cut into pieces no longer than this, metres: the renderer lights each on a map of its own.
+const PIECE_M: f64 = 3.0;
 
 /// A hole in one wall of one room, in the wall's frame.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -150,9 +150,9 @@ pub(super) fn build_room(
     height_m: f64,
     rng: &mut ChaCha8Rng,
 ) {
-    let floor_pen = &mut scene.pen(Spot::new(0.0, 0.0, 0));
-    slab(floor_pen, &look.floor, &room.cell, 0.0, Facing::Up);
-    slab(floor_pen, &style.ceiling, &room.cell, height_m, Facing::Down);
+    let plan = &mut scene.pen(Spot::new(0.0, 0.0, 0));
+    slab(plan, &look.floor, &room.cell, 0.0, Facing::Up);
+    slab(plan, &style.ceiling, &room.cell, height_m, Facing::Down);
     for (k, side) in Side::ALL.into_iter().enumerate() {
         let (frame, length) = (room.floor.side(side), room.floor.side_length(side));
         let pen = &mut scene.pen(frame);

@@ -36,6 +36,16 @@ fn leaf(pen: &mut Pen<'_>, look: &Look, from: f64, rise: f64, reach: f64) {
     }
 }
 
+/// A ribbed radiator on the wall.
+pub(super) fn radiator(pen: &mut Pen<'_>, style: &Style) {
+    pen.cuboid(&style.trim, [-0.45, 0.02, 0.14], [0.45, 0.06, 0.66]);
+    for k in 0..12 {
+        let x = -0.44 + 0.075 * f64::from(k);
+        pen.cuboid(&style.trim, [x, 0.06, 0.16], [x + 0.05, 0.1, 0.64]);
+    }
+    pen.post(&style.metal, (0.47, 0.05), 0.018, (0.1, 0.22));
+}
+
 /// A lamp on a pole.
 pub(super) fn floor_lamp(pen: &mut Pen<'_>, look: &RoomStyle, style: &Style) {
     pen.turned(&style.metal, (0.0, 0.17), &[(0.15, 0.0), (0.15, 0.02), (0.0, 0.03)], 16);

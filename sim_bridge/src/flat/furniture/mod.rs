@@ -43,6 +43,10 @@ pub(super) enum Piece {
     DiningSet(u32),
     /// Counter with oven and sink, and cupboards above, so wide in metres.
     Kitchen(f64),
+    /// The same without cupboards above, so that it fits below a window.
+    Counter(f64),
+    /// Below a window.
+    Radiator,
     /// A fridge.
     Fridge,
     /// A washing machine.
@@ -78,6 +82,8 @@ impl Piece {
             Piece::Desk => (1.3, 1.1, 1.2),
             Piece::DiningSet(n) => (0.25 + 0.62 * f64::from(n), 1.7, 0.9),
             Piece::Kitchen(w) => (w, 0.62, 2.1),
+            Piece::Counter(w) => (w, 0.62, 1.15),
+            Piece::Radiator => (0.9, 0.12, 0.68),
             Piece::Fridge => (0.62, 0.65, 1.8),
             Piece::Washer => (0.6, 0.58, 0.85),
             Piece::Bath => (1.65, 0.75, 0.58),
@@ -106,6 +112,8 @@ impl Piece {
             Piece::Boxes => storage::boxes(pen, look, style, rng),
             Piece::Bed(w) => sleeping::bed(pen, w, look, style),
             Piece::Kitchen(w) => wet::kitchen(pen, w, look, style, rng),
+            Piece::Counter(w) => wet::counter(pen, w, look, style),
+            Piece::Radiator => decor::radiator(pen, style),
             Piece::Fridge => wet::fridge(pen, style),
             Piece::Washer => wet::washer(pen, style),
             Piece::Bath => wet::bath(pen, style),

@@ -13,7 +13,7 @@ pub(super) fn sofa(pen: &mut Pen<'_>, seats: u32, look: &RoomStyle) {
     let width = 0.4 + 0.62 * f64::from(seats);
     seat(pen, width, seats, 0.9, look);
     let x = 0.5 * width - 0.48;
-    pen.at(x, 0.36, 0.3).cushion(&look.accent, [-0.2, -0.06, 0.47], [0.2, 0.06, 0.83], 0.06);
+    pen.at(x, 0.42, 0.2).cushion(&look.accent, [-0.18, -0.06, 0.46], [0.18, 0.08, 0.78], 0.06);
 }
 
 /// A seat for one.

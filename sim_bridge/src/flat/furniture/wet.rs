@@ -3,6 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::super::builder::Look;
 use super::super::pen::Pen;
 use super::super::style::{RoomStyle, Style};
 
@@ -33,6 +34,23 @@ pub(super) fn kitchen(pen: &mut Pen<'_>, width: f64, look: &RoomStyle, style: &S
     pen.cuboid(&style.metal, [sink - 0.24, 0.1, 0.9], [sink + 0.24, 0.52, 0.905]);
     pen.post(&style.metal, (sink, 0.07), 0.015, (0.9, 1.15));
     pen.cuboid(&style.metal, [sink - 0.012, 0.06, 1.13], [sink + 0.012, 0.26, 1.15]);
+}
+
+/// A counter with fronts and a sink, nothing above.
+pub(super) fn counter(pen: &mut Pen<'_>, width: f64, look: &RoomStyle, style: &Style) {
+    let half = 0.5 * width;
+    pen.cuboid(&style.metal, [-half, 0.0, 0.0], [half, 0.52, 0.1]);
+    pen.cuboid(&style.lacquer, [-half, 0.0, 0.1], [half, 0.58, 0.86]);
+    pen.cuboid(&look.wood, [-half, 0.0, 0.86], [half, 0.62, 0.9]);
+    let n = (width / 0.6).round().max(1.0);
+    for k in 0..n as u32 {
+        let x0 = -half + width / n * f64::from(k);
+        pen.cuboid(&style.lacquer, [x0 + 0.005, 0.58, 0.12], [x0 + width / n - 0.005, 0.6, 0.85]);
+        pen.cuboid(&style.metal, [x0 + 0.1, 0.6, 0.78], [x0 + width / n - 0.1, 0.62, 0.795]);
+    }
+    pen.cuboid(&style.metal, [-0.24, 0.1, 0.9], [0.24, 0.52, 0.905]);
+    pen.post(&style.metal, (0.0, 0.07), 0.015, (0.9, 1.12));
+    pen.cuboid(&style.metal, [-0.012, 0.06, 1.1], [0.012, 0.26, 1.12]);
 }
 
 /// A fridge with two doors.
@@ -82,5 +100,5 @@ pub(super) fn basin(pen: &mut Pen<'_>, look: &RoomStyle, style: &Style) {
     pen.post(&style.metal, (0.0, 0.06), 0.014, (0.88, 1.05));
     pen.cuboid(&style.metal, [-0.01, 0.05, 1.03], [0.01, 0.18, 1.05]);
     pen.cuboid(&style.metal, [-0.26, 0.0, 1.15], [0.26, 0.02, 1.75]);
-    pen.cuboid(&style.windows[0].tinted([0.75, 0.8, 0.85]), [-0.24, 0.02, 1.17], [0.24, 0.024, 1.73]);
+    pen.cuboid(&Look::plain([0.5, 0.58, 0.62]), [-0.24, 0.02, 1.17], [0.24, 0.024, 1.73]);
 }
