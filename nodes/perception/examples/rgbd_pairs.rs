@@ -3,13 +3,16 @@
 //!
 //! A pair without a pose counts as failed.
 
+#[path = "support/poses.rs"]
+mod poses;
 mod support;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use homing_core::{Sighting, StageTimes};
 use homing_perception::{GoalEstimator, PerceptionConfig, PoseSolver};
-use support::{Fallible, PosedFrame, quantile, seven_scenes};
+use poses::t_world_camera;
+use support::{Fallible, NumberedFrame, seven_scenes};
 
 struct Outcome {
     position_m: f64,
@@ -52,7 +55,7 @@ fn main() -> Fallible<()> {
     for gap in [50, 100] {
         let mut outcomes = Vec::new();
         for seed in 0..seeds as u64 {
-            outcomes.extend(pairs(&frames, gap, PerceptionConfig { seed, ..config })?);
+            outcomes.extend(pairs(&folder, &frames, gap, PerceptionConfig { seed, ..config })?);
         }
         if arguments.iter().any(|a| a == "--verbose") {
             for (number, outcome) in &outcomes {
@@ -71,14 +74,19 @@ fn main() -> Fallible<()> {
 }
 
 /// One outcome per pair of frames `gap` original frames apart.
-fn pairs(frames: &[PosedFrame], gap: u64, config: PerceptionConfig) -> Fallible<Vec<(u64, Option<Outcome>)>> {
+fn pairs(
+    folder: &Path,
+    frames: &[NumberedFrame],
+    gap: u64,
+    config: PerceptionConfig,
+) -> Fallible<Vec<(u64, Option<Outcome>)>> {
     let mut estimator = GoalEstimator::new(config)?;
     let mut outcomes = Vec::new();
     for query in frames {
         let Some(goal) = frames.iter().find(|f| f.number == query.number + gap) else { continue };
         estimator.set_goal(goal.as_goal())?;
         let estimate = estimator.estimate(&query.frame)?;
-        let truth = query.t_world_camera.inverse() * goal.t_world_camera;
+        let truth = t_world_camera(folder, query.number)?.inverse() * t_world_camera(folder, goal.number)?;
         let outcome = match estimate.sighting {
             Sighting::Pose { t_camera_goal, covariance, n_inliers, .. } => {
                 let found = t_camera_goal.isometry();
@@ -135,4 +143,9 @@ fn report(gap: u64, outcomes: &[Option<Outcome>]) {
     stage("match", &|t| t.matching);
     stage("pose", &|t| t.pose);
     stage("total", &|t| t.extract + t.matching + t.pose);
+}
+
+/// The value below which `share` of the sorted values lie.
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    if sorted.is_empty() { f64::NAN } else { sorted[((sorted.len() - 1) as f64 * share).round() as usize] }
 }

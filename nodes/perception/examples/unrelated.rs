@@ -11,8 +11,7 @@ use std::sync::Arc;
 
 use homing_core::{DepthImage, GoalEstimate, Intrinsics, RgbdFrame, Sighting, Stamp};
 use homing_perception::{Gates, GoalEstimator, PerceptionConfig};
-use nalgebra::Isometry3;
-use support::{Fallible, PosedFrame, files_with, read_depth, read_rgb, seven_scenes};
+use support::{Fallible, NumberedFrame, files_with, read_depth, read_rgb, seven_scenes};
 
 fn main() -> Fallible<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -24,9 +23,10 @@ fn main() -> Fallible<()> {
     let ratio_max: f32 = value("--ratio").map_or(Ok(PerceptionConfig::default().ratio_max), |text| text.parse())?;
     let mut frames = [seven_scenes(Path::new(first))?, living_room(Path::new(second), every)?];
     frames[0] = core::mem::take(&mut frames[0]).into_iter().step_by(every).collect();
-    if arguments.iter().any(|a| a == "--no-depth") {
-        for posed in frames.iter_mut().flatten() {
-            posed.frame.depth = Arc::new(DepthImage::from_metres(640, 480, vec![0.0; 640 * 480])?);
+    let counted = if arguments.iter().any(|a| a == "--no-depth") { Counted::Bearings } else { Counted::Poses };
+    if matches!(counted, Counted::Bearings) {
+        for numbered in frames.iter_mut().flatten() {
+            numbered.frame.depth = Arc::new(DepthImage::from_metres(640, 480, vec![0.0; 640 * 480])?);
         }
     }
     let gates =
@@ -38,12 +38,19 @@ fn main() -> Fallible<()> {
         for goal in goals {
             estimator.set_goal(goal.as_goal())?;
             for query in queries {
-                found.push(support_of(&estimator.estimate(&query.frame)?));
+                found.push(support_of(&estimator.estimate(&query.frame)?, counted));
             }
         }
     }
     report(&mut found);
     Ok(())
+}
+
+/// Which findings are of interest.
+#[derive(Copy, Clone)]
+enum Counted {
+    Poses,
+    Bearings,
 }
 
 struct Support {
@@ -52,10 +59,11 @@ struct Support {
     ms: f64,
 }
 
-fn support_of(estimate: &GoalEstimate) -> Support {
-    let n_inliers = match estimate.sighting {
-        Sighting::Pose { n_inliers, .. } | Sighting::Bearing { n_inliers, .. } => n_inliers,
-        Sighting::NotSeen { .. } => 0,
+fn support_of(estimate: &GoalEstimate, counted: Counted) -> Support {
+    let n_inliers = match (&estimate.sighting, counted) {
+        (Sighting::Pose { n_inliers, .. }, Counted::Poses) => *n_inliers,
+        (Sighting::Bearing { n_inliers, .. }, Counted::Bearings) => *n_inliers,
+        _ => 0,
     };
     Support { n_matches: estimate.n_matches, n_inliers, ms: estimate.times.pose.as_secs_f64() * 1e3 }
 }
@@ -82,7 +90,7 @@ fn report(found: &mut [Support]) {
     println!("  pose: p50 {:.1} ms, most {:.1} ms", found[n / 2].ms, found[n - 1].ms);
 }
 
-fn living_room(folder: &Path, every: usize) -> Fallible<Vec<PosedFrame>> {
+fn living_room(folder: &Path, every: usize) -> Fallible<Vec<NumberedFrame>> {
     let intrinsics = Intrinsics::new(640, 480, 525.0, 525.0, 319.5, 239.5)?;
     let (images, depths) = (files_with(&folder.join("image"), ".")?, files_with(&folder.join("depth"), ".")?);
     let mut frames = Vec::new();
@@ -90,7 +98,7 @@ fn living_room(folder: &Path, every: usize) -> Fallible<Vec<PosedFrame>> {
         let (rgb, depth) = (Arc::new(read_rgb(image)?), Arc::new(read_depth(depth)?));
         let number = number as u64;
         let frame = RgbdFrame::new(Stamp(number), rgb, depth, intrinsics)?;
-        frames.push(PosedFrame { number, frame, t_world_camera: Isometry3::identity() });
+        frames.push(NumberedFrame { number, frame });
     }
     Ok(frames)
 }

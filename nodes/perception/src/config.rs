@@ -30,6 +30,9 @@ pub struct Gates {
 }
 
 impl Default for Gates {
+    /// Between frames of two unrelated rooms (1,350 pairs, 45 matches each on average) at most 6 matches agreed on a
+    /// pose; without depth (162 pairs) at most 14 and a third of the matches agreed on a bearing. Measured by the example
+    /// `unrelated`. Things that are really there twice, such as two prints of one poster, agree in larger numbers.
     fn default() -> Self {
         Self {
             n_inliers_min: 10,

@@ -10,7 +10,9 @@ use thiserror::Error;
 pub struct RuntimeReport {
     /// The library asked for.
     pub library: PathBuf,
-    /// ONNX Runtime's own description of its build: version, commit, flags.
+    /// Version of that library, "1.31".
+    pub version: String,
+    /// The description of the build in use: commit, flags.
     pub build: String,
     /// Execution providers, best first, and whether the library was built with each. Built with does not mean that the
     /// machine has the device: only opening a model on it tells.
@@ -50,9 +52,11 @@ pub fn load_runtime(library: &Path) -> Result<RuntimeReport, RuntimeError> {
     // An absolute path: a relative one would be looked for beside the executable first.
     let absolute = std::path::absolute(library).map_err(|e| unusable(e.to_string()))?;
     let _environment = ort::init_from(&absolute).map_err(|e| unusable(e.to_string()))?;
+    let minor = ort::util::probe(&absolute).ok_or_else(|| unusable("it is not of version 1".to_owned()))?;
     let available = |found: ort::Result<bool>| found.map_err(|e| unusable(e.to_string()));
     Ok(RuntimeReport {
         library: absolute.clone(),
+        version: format!("1.{minor}"),
         build: ort::info().to_owned(),
         providers: vec![("CUDA", available(CUDA::is_available())?), ("CPU", available(CPU::is_available())?)],
     })

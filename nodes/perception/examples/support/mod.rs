@@ -1,33 +1,30 @@
-//! Reads folders of RGB-D frames: 7-Scenes style (frame-XXXXXX.color.*, .depth.png, .pose.txt).
+//! Reads folders of RGB-D frames: 7-Scenes style (frame-XXXXXX.color.*, .depth.png).
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use homing_core::{DepthImage, GoalPhoto, Intrinsics, RgbImage, RgbdFrame, Stamp};
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use opencv::core::Mat;
 use opencv::prelude::*;
 use opencv::{imgcodecs, imgproc};
 
 pub type Fallible<T> = Result<T, Box<dyn Error>>;
 
-/// One frame of a folder, with its pose in the world where the folder gives one.
-pub struct PosedFrame {
+/// One frame of a folder.
+pub struct NumberedFrame {
     pub number: u64,
     pub frame: RgbdFrame,
-    #[allow(dead_code, reason = "each example uses its own part of this module")]
-    pub t_world_camera: Isometry3<f64>,
 }
 
-impl PosedFrame {
+impl NumberedFrame {
     pub fn as_goal(&self) -> GoalPhoto {
         GoalPhoto { id: self.number, rgb: Arc::clone(&self.frame.rgb), intrinsics: self.frame.intrinsics }
     }
 }
 
 /// All frames of a 7-Scenes folder, in order. The colour files end in jpg or png.
-pub fn seven_scenes(folder: &Path) -> Fallible<Vec<PosedFrame>> {
+pub fn seven_scenes(folder: &Path) -> Fallible<Vec<NumberedFrame>> {
     let intrinsics = Intrinsics::new(640, 480, 585.0, 585.0, 320.0, 240.0)?;
     let mut frames = Vec::new();
     for color in files_with(folder, ".color.")? {
@@ -35,10 +32,9 @@ pub fn seven_scenes(folder: &Path) -> Fallible<Vec<PosedFrame>> {
         let stem = name.split('.').next().unwrap_or_default().to_owned();
         let number: u64 = stem.trim_start_matches("frame-").parse()?;
         let depth = read_depth(&folder.join(format!("{stem}.depth.png")))?;
-        let t_world_camera = read_pose(&folder.join(format!("{stem}.pose.txt")))?;
         let rgb = Arc::new(read_rgb(&color)?);
         let frame = RgbdFrame::new(Stamp(number * 33_000_000), rgb, Arc::new(depth), intrinsics)?;
-        frames.push(PosedFrame { number, frame, t_world_camera });
+        frames.push(NumberedFrame { number, frame });
     }
     Ok(frames)
 }
@@ -62,23 +58,4 @@ pub fn read_rgb(path: &Path) -> Fallible<RgbImage> {
 pub fn read_depth(path: &Path) -> Fallible<DepthImage> {
     let mm = imgcodecs::imread(path, imgcodecs::IMREAD_UNCHANGED)?;
     Ok(DepthImage::from_millimetres(u32::try_from(mm.cols())?, u32::try_from(mm.rows())?, mm.data_typed::<u16>()?)?)
-}
-
-fn read_pose(path: &Path) -> Fallible<Isometry3<f64>> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let m = text.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>()?;
-    if m.len() != 16 {
-        return Err(format!("{}: {} numbers instead of 16", path.display(), m.len()).into());
-    }
-    let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
-    let svd = rotation.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Err("no SVD".into()) };
-    let proper = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * v_t));
-    Ok(Isometry3::from_parts(Translation3::from(Vector3::new(m[3], m[7], m[11])), proper))
-}
-
-/// The value below which `share` of the sorted values lie.
-#[allow(dead_code, reason = "each example uses its own part of this module")]
-pub fn quantile(sorted: &[f64], share: f64) -> f64 {
-    if sorted.is_empty() { f64::NAN } else { sorted[((sorted.len() - 1) as f64 * share).round() as usize] }
 }
