@@ -1,2 +1,71 @@
-//! homing
-fn main() {}
+//! The `homing` command: show a robot a photo, and it drives to where the photo was taken.
+
+mod bench;
+mod demo;
+mod doctor;
+mod fleet;
+mod goto;
+mod mission;
+mod photo;
+mod replay;
+mod run_folder;
+mod settings;
+mod verdict;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Show a robot a photo, and it drives to the place where the photo was taken.
+///
+/// Exit codes: 0 the goal was reached (or all is well), 1 it was not, 2 wrong usage or bad input, 130 interrupted.
+#[derive(Parser)]
+#[command(name = "homing", version, arg_required_else_help = true)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Drive a simulated robot through a flat it has never seen, to the place of a photo.
+    Demo(demo::DemoArgs),
+    /// Send a photo to a running robot.
+    Goto(goto::GotoArgs),
+    /// Play a recording of real RGB-D frames through the same processes, and compare with the true poses.
+    Replay(replay::ReplayArgs),
+    /// Run many episodes in this process, and report success, SPL and final errors.
+    Bench(bench::BenchArgs),
+    /// Say what is installed, which provider and GPU, ports and versions.
+    Doctor(doctor::DoctorArgs),
+}
+
+/// How a command ended.
+pub enum Ended {
+    /// As wished.
+    Well,
+    /// It ran, and the goal was missed.
+    Missed,
+    /// Ctrl-C.
+    Interrupted,
+}
+
+fn main() -> ExitCode {
+    homing_protocol::process::start_log();
+    let ended = match Args::parse().command {
+        Command::Demo(args) => demo::run(args),
+        Command::Goto(args) => goto::run(args),
+        Command::Replay(args) => replay::run(args),
+        Command::Bench(args) => bench::run(args),
+        Command::Doctor(args) => doctor::run(args),
+    };
+    match ended {
+        Ok(Ended::Well) => ExitCode::SUCCESS,
+        Ok(Ended::Missed) => ExitCode::from(1),
+        Ok(Ended::Interrupted) => ExitCode::from(130),
+        Err(cause) => {
+            eprintln!("homing: {cause:#}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -18,6 +18,7 @@ pub mod photo;
 pub mod pnp;
 pub mod provider;
 pub mod sift;
+mod synthesis;
 
 pub use config::{Gates, PerceptionConfig, PoseSolver};
 pub use error::PerceptionError;
@@ -25,5 +26,5 @@ pub use estimator::GoalEstimator;
 pub use lift::DepthModel;
 pub use matching::MutualNearest;
 pub use photo::{FieldOfView, Photo, PhotoError, decode_photo};
-pub use provider::{RuntimeError, RuntimeReport, load_runtime};
+pub use provider::{RuntimeError, RuntimeReport, load_runtime, opencv_version};
 pub use sift::{Sift, SiftConfig};

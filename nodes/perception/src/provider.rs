@@ -79,3 +79,11 @@ mod tests {
         assert!(matches!(unusable, RuntimeError::Unusable { .. }), "{unusable}");
     }
 }
+
+/// Version of the OpenCV library in use, "4.6.0".
+///
+/// # Errors
+/// OpenCV's own error when the library does not answer.
+pub fn opencv_version() -> Result<String, opencv::Error> {
+    opencv::core::get_version_string()
+}

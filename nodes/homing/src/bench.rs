@@ -1,0 +1,77 @@
+//! `homing bench`: many episodes in this process, as fast as the machine goes.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use homing_benchmark::{BenchOptions, EpisodeRow, bench};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::Ended;
+use crate::demo::Policy;
+
+/// Runs one curved episode of 3 to 10 m in the flat of each seed, and reports success, SPL and final errors.
+///
+/// The libraries are those of the processes, called in lockstep without the network: the same decisions, faster.
+#[derive(Args)]
+pub struct BenchArgs {
+    /// Seeds, as A..B: from A to B without B.
+    #[arg(long, default_value = "1000..1100", value_parser = seeds)]
+    seeds: std::ops::Range<u64>,
+    /// How to explore while the goal has not been seen.
+    #[arg(long, value_enum, default_value_t = Policy::Frontier)]
+    policy: Policy,
+    /// Episodes side by side; 0 for one per core.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Write the whole report here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
+    let parse = || {
+        let (from, to) = text.split_once("..")?;
+        Some(from.trim().parse().ok()?..to.trim().parse().ok()?)
+    };
+    match parse() {
+        Some(range) if range.start < range.end => Ok(range),
+        _ => Err(format!("{text:?} is not a range of seeds such as 1000..1100")),
+    }
+}
+
+pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
+    // Known before the hours are spent: can the report be written?
+    if let Some(path) = &args.json {
+        std::fs::File::options()
+            .create(true)
+            .append(true)
+            .open(path)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let policy = match args.policy {
+        Policy::Straight => homing_benchmark::Policy::Straight,
+        Policy::Frontier => homing_benchmark::Policy::Frontier,
+    };
+    let options = BenchOptions { policy, threads: args.threads, ..BenchOptions::default() };
+    let seeds: Vec<u64> = args.seeds.collect();
+    if seeds.len() > 100_000 {
+        bail!("{} episodes are more than 100000", seeds.len());
+    }
+    let style =
+        ProgressStyle::with_template("{bar:30} {pos}/{len} episodes  [{elapsed}, about {eta} left]  {wide_msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(seeds.len() as u64).with_style(style);
+    let reached = std::sync::atomic::AtomicUsize::new(0);
+    let report = bench(&seeds, &options, &|row: &EpisodeRow| {
+        let n = reached.fetch_add(usize::from(row.score.success), std::sync::atomic::Ordering::Relaxed);
+        bar.inc(1);
+        bar.set_message(format!("{} reached the goal", n + usize::from(row.score.success)));
+    })?;
+    bar.finish_and_clear();
+    println!("{report}");
+    if let Some(path) = &args.json {
+        std::fs::write(path, report.to_json()?).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(Ended::Well)
+}

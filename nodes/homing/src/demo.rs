@@ -1,0 +1,344 @@
+//! `homing demo`: four processes take a simulated robot to the place of a photo.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use homing_core::PlanarPose;
+use homing_privileged::{EPISODE_SUMMARY, GROUND_TRUTH, GroundTruth};
+use homing_protocol::convert::{EncodedPhoto, ToDomain};
+use homing_protocol::interfaces::homing_msgs::{self, EpisodeSummary};
+use homing_protocol::session::{DEFAULT_ENDPOINT, Link, SessionConfig};
+use homing_protocol::{Session, Subscription, topics};
+use homing_sim::episode::{self, GoalPlace};
+use homing_sim::geodesic::GeodesicField;
+use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, Finish, SceneRef, Score};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::fleet::Fleet;
+use crate::mission::{self, Watched};
+use crate::run_folder::RunFolder;
+use crate::settings::{MonitorFile, Network, PerceptionFile, PlannerFile, PlannerPace, SimFile, TruthFile};
+use crate::verdict::{About, Verdict};
+use crate::{Ended, photo};
+
+/// Drives a simulated robot through a flat it has never seen, to the place of a photo.
+///
+/// Four processes meet over zenoh: the simulated body, perception, planner and monitor. The goal lies in another room, 5 to
+/// 10 m of way from the start. Leaves a recording, a picture and the result in a folder of its own.
+#[derive(Args)]
+pub struct DemoArgs {
+    /// Seed of the flat, the start and the goal.
+    #[arg(long, default_value_t = 7)]
+    seed: u64,
+    /// A glTF 2.0 scene (.glb) instead of a generated flat.
+    #[arg(long, value_name = "FILE.glb")]
+    scene: Option<PathBuf>,
+    /// A photo of your own to drive to; its true place is unknown, so there is no score.
+    #[arg(long, value_name = "PHOTO")]
+    goal: Option<PathBuf>,
+    /// Horizontal field of view of that photo's camera, degrees.
+    #[arg(long, requires = "goal")]
+    hfov_deg: Option<f64>,
+    /// How to explore while the goal has not been seen.
+    #[arg(long, value_enum, default_value_t = Policy::Frontier)]
+    policy: Policy,
+    /// By the wall clock instead of in lockstep.
+    #[arg(long)]
+    realtime: bool,
+    /// Open the rerun viewer and watch live.
+    #[arg(long)]
+    view: bool,
+    /// Print the result as JSON, and nothing else, on stdout.
+    #[arg(long)]
+    json: bool,
+    /// Where the processes meet.
+    #[arg(long, default_value = DEFAULT_ENDPOINT)]
+    endpoint: String,
+    /// Folder for the results.
+    #[arg(long, default_value = "runs")]
+    out: PathBuf,
+}
+
+/// Goal-discovery policies.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Policy {
+    /// Straight ahead, right when blocked.
+    Straight,
+    /// To the edges of what is known.
+    Frontier,
+}
+
+impl Policy {
+    pub fn name(self) -> &'static str {
+        match self {
+            Policy::Straight => "straight",
+            Policy::Frontier => "frontier",
+        }
+    }
+}
+
+#[tokio::main]
+pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
+    let given = args.goal.as_deref().map(|path| photo::read(path, args.hfov_deg)).transpose()?;
+    let bar = waiting("preparing the scene");
+    let task = tokio::task::block_in_place(|| Task::draw(&args))?;
+    let folder = RunFolder::create(&args.out, &format!("demo-seed-{}", args.seed))?;
+    let photo = match given {
+        Some(photo) => photo,
+        None => task.photo()?,
+    };
+    folder.write(if photo.file.starts_with(&[0xff, 0xd8]) { "goal.jpg" } else { "goal.png" }, &photo.file)?;
+
+    bar.set_message("starting four processes: body, perception, planner, monitor");
+    let mut fleet = start(&args, &task, &folder)?;
+    let session = join(&args, &mut fleet).await?;
+    let mut scorer = Scorer { truths: session.subscribe(&GROUND_TRUTH, 64)?, last: None };
+    let summary = session.publisher(&EPISODE_SUMMARY)?;
+    all_ready(&session, &mut fleet).await?;
+    bar.finish_and_clear();
+
+    let bar = mission::bar(homing_sim::constants::STEPS_MAX);
+    let watched = mission::drive(&session, &photo, &bar, || {
+        scorer.listen();
+        still_possible(&mut fleet, &bar)
+    })
+    .await;
+    bar.finish_and_clear();
+    let report = match watched? {
+        Watched::Ended(report) => report,
+        Watched::Interrupted => {
+            eprintln!(
+                "interrupted: the robot stands; what was recorded is in {}",
+                crate::run_folder::shown(&folder.file(""))
+            );
+            leave(&mut fleet);
+            return Ok(Ended::Interrupted);
+        }
+    };
+
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    scorer.listen();
+    let score = if args.goal.is_some() { None } else { scorer.score(&task)? };
+    let about = About {
+        scene: task.arena.scene().name.clone(),
+        seed: args.seed,
+        policy: args.policy.name(),
+        recording: folder.file("episode.rrd"),
+        picture: folder.file("episode.png"),
+    };
+    let verdict = Verdict::new(&report, score.as_ref(), about);
+    summary.publish(&message(&verdict))?;
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    session.close();
+    let closing = waiting("closing the recording");
+    tokio::task::block_in_place(|| leave(&mut fleet));
+    closing.finish_and_clear();
+    let result = folder.write_json("result.json", &verdict)?;
+    if args.json {
+        println!("{}", serde_json::to_string(&verdict)?);
+    } else {
+        verdict.print(&result);
+    }
+    Ok(if verdict.success { Ended::Well } else { Ended::Missed })
+}
+
+/// The scene and the episode in it.
+struct Task {
+    arena: Arc<Arena>,
+    episode: Episode,
+}
+
+impl Task {
+    fn draw(args: &DemoArgs) -> anyhow::Result<Self> {
+        let scene = match &args.scene {
+            Some(path) => {
+                let path = path.canonicalize().with_context(|| format!("the scene {}", path.display()))?;
+                SceneRef::Glb { path }
+            }
+            None => SceneRef::Flat { seed: args.seed },
+        };
+        let arena = Arc::new(Arena::load(&scene, BodySize::default())?);
+        let spec = EpisodeSpec { min_m: 5.0, max_m: 10.0, goal_place: GoalPlace::OtherRoom, ..EpisodeSpec::default() };
+        let episode = episode::draw(&arena, args.seed, &spec)?;
+        Ok(Self { arena, episode })
+    }
+
+    fn photo(&self) -> anyhow::Result<EncodedPhoto> {
+        let image = self.episode.camera.photo(&self.arena, self.episode.goal)?;
+        let file = photo::png(&image)?;
+        Ok(EncodedPhoto { id: photo::name_of(&file), file, intrinsics: self.episode.camera.intrinsics()? })
+    }
+
+    fn goal_field(&self) -> anyhow::Result<GeodesicField<'_>> {
+        Ok(GeodesicField::to(self.arena.space(), (self.episode.goal.x_m, self.episode.goal.y_m))?)
+    }
+
+    /// Goal and shortest path in the odometry frame, for the monitor.
+    fn truth(&self) -> anyhow::Result<TruthFile> {
+        let start = PlanarPose::from(self.episode.start);
+        let at_start = GroundTruth {
+            stamp: Default::default(),
+            pose: start,
+            start,
+            path_length_m: 0.0,
+            steps: 0,
+            collisions: 0,
+            done: false,
+        };
+        let goal = at_start.in_odom(self.episode.goal.into());
+        let path = self.goal_field()?.path(start.x_m, start.y_m).unwrap_or_default();
+        let in_odom = |p: &(f64, f64)| {
+            let p = at_start.in_odom(PlanarPose { x_m: p.0, y_m: p.1, yaw_rad: 0.0 });
+            [p.x_m, p.y_m]
+        };
+        Ok(TruthFile { goal: [goal.x_m, goal.y_m, goal.yaw_rad], shortest_path: path.iter().map(in_odom).collect() })
+    }
+}
+
+fn start(args: &DemoArgs, task: &Task, folder: &RunFolder) -> anyhow::Result<Fleet> {
+    let network = || Network::connect(&args.endpoint);
+    let episode = folder.write_json("episode.json", &task.episode)?;
+    let (pace, answer_ms_max) = if args.realtime { ("real_time", 500) } else { ("lockstep", 5_000) };
+    let truth = match args.goal {
+        Some(_) => None,
+        None => Some(folder.write_json("truth.json", &task.truth()?)?),
+    };
+    let sim = folder.write_toml("sim.toml", &SimFile { pace, episode, session: Network::listen(&args.endpoint) })?;
+    let perception = folder.write_toml("perception.toml", &PerceptionFile { session: network() })?;
+    let planner = PlannerFile { policy: args.policy.name(), session: network(), pace: PlannerPace { answer_ms_max } };
+    let planner = folder.write_toml("planner.toml", &planner)?;
+    let monitor = MonitorFile {
+        recording: folder.file("episode.rrd"),
+        viewer: if args.view { Some(viewer()?) } else { None },
+        picture: Some(folder.file("episode.png")),
+        truth,
+        session: network(),
+    };
+    let monitor = folder.write_toml("monitor.toml", &monitor)?;
+    let mut fleet = Fleet::default();
+    fleet.start("body", "homing-sim", &sim, folder)?;
+    fleet.start("monitor", "homing-monitor", &monitor, folder)?;
+    fleet.start("perception", "homing-perception", &perception, folder)?;
+    fleet.start("planner", "homing-planner", &planner, folder)?;
+    Ok(fleet)
+}
+
+/// The rerun viewer: the project's own Python environment has one.
+fn viewer() -> anyhow::Result<PathBuf> {
+    let own = Path::new(".venv/bin/rerun");
+    if own.is_file() {
+        return Ok(own.canonicalize()?);
+    }
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&paths)
+        .map(|folder| folder.join("rerun"))
+        .find(|program| program.is_file())
+        .context("no rerun viewer found: run ./deploy/demo once, or pip install rerun-sdk==0.36.3")
+}
+
+/// Joins the network as soon as the body listens.
+async fn join(args: &DemoArgs, fleet: &mut Fleet) -> anyhow::Result<Session> {
+    let mut config = SessionConfig::new("homing", Link::Connect(vec![args.endpoint.clone()]));
+    config.connect_timeout = Duration::from_secs(2);
+    for _ in 0..15 {
+        fail_on_loss(fleet)?;
+        match tokio::task::block_in_place(|| Session::open(&config)) {
+            Ok(session) => {
+                // Somebody answers: is it our body?
+                tokio::time::sleep(Duration::from_millis(300)).await;
+                fail_on_loss(fleet)?;
+                return Ok(session);
+            }
+            Err(cause) => tracing::debug!(%cause, "not yet"),
+        }
+    }
+    bail!("the body does not listen on {} after 30 s", args.endpoint)
+}
+
+async fn all_ready(session: &Session, fleet: &mut Fleet) -> anyhow::Result<()> {
+    for _ in 0..300 {
+        fail_on_loss(fleet)?;
+        if session.has_sender(&topics::CAMERA_COLOR)
+            && session.has_sender(&topics::GOAL_ESTIMATE)
+            && session.has_sender(&topics::MOTION_COMMAND)
+        {
+            return Ok(());
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    bail!("not all processes came up within 30 s; their logs are in the run's folder")
+}
+
+fn fail_on_loss(fleet: &mut Fleet) -> anyhow::Result<()> {
+    match fleet.loss() {
+        Some(loss) => bail!("{} ended at once ({}):\n{}", loss.name, loss.status, loss.last_words),
+        None => Ok(()),
+    }
+}
+
+/// Without perception the planner explores on; without body or planner there is nothing to wait for.
+fn still_possible(fleet: &mut Fleet, bar: &ProgressBar) -> anyhow::Result<()> {
+    let Some(loss) = fleet.loss() else { return Ok(()) };
+    match loss.name {
+        "perception" | "monitor" => {
+            bar.suspend(|| {
+                eprintln!("{} is gone ({}); the robot goes on without it\n{}", loss.name, loss.status, loss.last_words)
+            });
+            Ok(())
+        }
+        name => bail!("{name} is gone ({}):\n{}", loss.status, loss.last_words),
+    }
+}
+
+/// Commanders first, so that the robot stands; the monitor after the body, so that it records the end.
+fn leave(fleet: &mut Fleet) {
+    fleet.stop("planner", Duration::from_secs(3));
+    fleet.stop("perception", Duration::from_secs(3));
+    fleet.stop("monitor", Duration::from_secs(25));
+    fleet.stop("body", Duration::from_secs(3));
+}
+
+/// Hears the truth and scores the end.
+struct Scorer {
+    truths: Subscription<homing_msgs::GroundTruth>,
+    last: Option<GroundTruth>,
+}
+
+impl Scorer {
+    fn listen(&mut self) {
+        while let Some(received) = self.truths.try_recv() {
+            match received.map_err(anyhow::Error::from).and_then(|r| Ok(r.message.to_domain()?)) {
+                Ok(truth) => self.last = Some(truth),
+                Err(cause) => tracing::warn!("ignored: {cause:#}"),
+            }
+        }
+    }
+
+    fn score(&self, task: &Task) -> anyhow::Result<Option<Score>> {
+        let Some(truth) = &self.last else { return Ok(None) };
+        Ok(Some(Score::strict(&Finish {
+            stopped: truth.done,
+            steps: truth.steps,
+            path_length_m: truth.path_length_m,
+            shortest_path_m: task.episode.shortest_path_m,
+            final_distance_m: task.goal_field()?.distance_m(truth.pose.x_m, truth.pose.y_m),
+            final_heading_error_rad: truth.pose.yaw_rad - task.episode.goal.yaw_rad,
+        })))
+    }
+}
+
+fn message(verdict: &Verdict) -> EpisodeSummary {
+    let facts: Vec<String> = verdict.facts().iter().map(|(name, value)| format!("{name}\t{value}")).collect();
+    EpisodeSummary { title: verdict.title(), success: verdict.success, facts: facts.join("\n") }
+}
+
+fn waiting(message: &'static str) -> ProgressBar {
+    let style =
+        ProgressStyle::with_template("{spinner} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let bar = ProgressBar::new_spinner().with_style(style).with_message(message);
+    bar.enable_steady_tick(Duration::from_millis(100));
+    bar
+}

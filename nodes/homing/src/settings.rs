@@ -1,0 +1,75 @@
+//! The TOML files that `homing` writes for the processes it starts: only what differs from their defaults.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+#[derive(Serialize)]
+pub struct Network {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub listen: Option<Vec<String>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub connect: Option<Vec<String>>,
+    /// Processes start side by side: give the body time to come up.
+    pub connect_timeout_s: u64,
+}
+
+impl Network {
+    pub fn listen(endpoint: &str) -> Self {
+        Self { listen: Some(vec![endpoint.to_owned()]), connect: None, connect_timeout_s: 30 }
+    }
+
+    pub fn connect(endpoint: &str) -> Self {
+        Self { listen: None, connect: Some(vec![endpoint.to_owned()]), connect_timeout_s: 30 }
+    }
+}
+
+#[derive(Serialize)]
+pub struct SimFile {
+    pub pace: &'static str,
+    pub episode: PathBuf,
+    pub session: Network,
+}
+
+#[derive(Serialize)]
+pub struct PerceptionFile {
+    pub session: Network,
+}
+
+#[derive(Serialize)]
+pub struct PlannerFile {
+    pub policy: &'static str,
+    pub session: Network,
+    pub pace: PlannerPace,
+}
+
+#[derive(Serialize)]
+pub struct PlannerPace {
+    pub answer_ms_max: u64,
+}
+
+#[derive(Serialize)]
+pub struct MonitorFile {
+    pub recording: PathBuf,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub viewer: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub picture: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<PathBuf>,
+    pub session: Network,
+}
+
+#[derive(Serialize)]
+pub struct RobotFile {
+    pub recording: PathBuf,
+    pub frames: Vec<u32>,
+    pub answers: &'static str,
+    pub session: Network,
+}
+
+#[derive(Serialize)]
+pub struct TruthFile {
+    pub goal: [f64; 3],
+    pub shortest_path: Vec<[f64; 2]>,
+}
