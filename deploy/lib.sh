@@ -304,6 +304,7 @@ set_up() {
 
 # ONE selection and ONE profile for demo, tests and CI: another would compile hundreds of crates again.
 build() {
+    local from=$SECONDS
     begin "build"
     if [[ -x $CARGO_TARGET_DIR/debug/homing ]]; then
         echo
@@ -312,4 +313,5 @@ build() {
     fi
     (cd "$root" && cargo build --workspace --locked) || fail $? "the build failed; cargo's message is above." \
         "If it could not fetch crates, check the network and start again."
+    say "$((SECONDS - from)) s"
 }
