@@ -7,6 +7,7 @@
 use homing_core::{Base, Camera, Goal, Odom, PlanarPose, Stamp, Transform, wrap_angle};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
+use crate::evidence::Evidence;
 use crate::hypothesis::Hypothesis;
 pub use crate::hypothesis::Measurement;
 
@@ -70,13 +71,15 @@ pub enum Joined {
     Fused,
     /// It opened a new one.
     Opened,
+    /// It covers too little of the view for how near the goal should be.
+    Weak,
     /// Its place lied before.
     Refused,
 }
 
 /// Whether anything on the map stands between the robot and a place.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
-pub enum View {
+pub enum Sightline {
     /// Nothing known.
     Clear,
     /// An obstacle.
@@ -105,19 +108,21 @@ pub struct GoalFilter {
     config: FilterConfig,
     hypotheses: Vec<Hypothesis>,
     liars: Vec<Liar>,
+    rigour: f64,
 }
 
 impl GoalFilter {
     /// Empty.
     #[must_use]
     pub fn new(config: FilterConfig) -> Self {
-        Self { config, hypotheses: Vec::new(), liars: Vec::new() }
+        Self { config, hypotheses: Vec::new(), liars: Vec::new(), rigour: 1.0 }
     }
 
     /// Forgets everything, liars included.
     pub fn reset(&mut self) {
         self.hypotheses.clear();
         self.liars.clear();
+        self.rigour = 1.0;
     }
 
     /// The knobs.
@@ -145,7 +150,7 @@ impl GoalFilter {
         t_base_camera: &Transform<Base, Camera>,
         t_camera_goal: &Transform<Camera, Goal>,
         covariance: &Matrix6<f64>,
-        n_inliers: usize,
+        evidence: Evidence,
     ) -> Option<Measurement> {
         let chain = t_odom_base.isometry() * t_base_camera.isometry() * t_camera_goal.isometry();
         let t_odom_goalbase: Transform<Odom, Base> =
@@ -167,11 +172,14 @@ impl GoalFilter {
         let sound = [pose.x_m, pose.y_m, pose.yaw_rad, range_m].iter().all(|v| v.is_finite())
             && planar.iter().all(|v| v.is_finite())
             && planar.cholesky().is_some();
-        sound.then_some(Measurement { stamp, pose, covariance: planar, n_inliers, from: here, range_m, turn_rad })
+        sound.then_some(Measurement { stamp, pose, covariance: planar, evidence, from: here, range_m, turn_rad })
     }
 
     /// Fuses a measurement with the hypothesis it agrees with best, or opens a new one.
     pub fn join(&mut self, measurement: &Measurement, step: u64) -> Joined {
+        if !measurement.evidence.suffices(measurement.range_m, measurement.turn_rad, self.rigour) {
+            return Joined::Weak;
+        }
         let closest = (0..self.hypotheses.len())
             .map(|i| (self.hypotheses[i].distance_square(measurement), i))
             .filter(|(square, _)| *square <= GATE)
@@ -183,7 +191,7 @@ impl GoalFilter {
         if self
             .liars
             .iter()
-            .any(|liar| self.near(&liar.pose, &measurement.pose) && measurement.n_inliers < 2 * liar.n_inliers)
+            .any(|liar| self.near(&liar.pose, &measurement.pose) && measurement.evidence.n_inliers < 2 * liar.n_inliers)
         {
             return Joined::Refused;
         }
@@ -242,7 +250,7 @@ impl GoalFilter {
     /// Perception looked from `pose`, with nothing in between if `clear`, and did not agree with the best hypothesis. From a
     /// view that is no worse than those that did agree this is held against it; from one that is all but the photo's own,
     /// `misses_max` times in a row, it refutes it.
-    pub fn doubt(&mut self, pose: &PlanarPose, clear: View, step: u64) -> Doubt {
+    pub fn doubt(&mut self, pose: &PlanarPose, clear: Sightline, step: u64) -> Doubt {
         let config = self.config;
         let Some(best) = self.best_index(step) else { return Doubt::None };
         let hypothesis = &mut self.hypotheses[best];
@@ -253,7 +261,7 @@ impl GoalFilter {
         if alike {
             hypothesis.n_misses += 1;
         }
-        if alike || (no_worse && clear == View::Clear) {
+        if alike || (no_worse && clear == Sightline::Clear) {
             hypothesis.support *= config.miss_factor;
         }
         if hypothesis.n_misses >= config.misses_max { Doubt::Refuted } else { Doubt::None }
@@ -277,10 +285,12 @@ impl GoalFilter {
         }
     }
 
-    /// Nothing else is left: believe liars and parked places again. Returns false if there was nothing to forgive.
+    /// Nothing else is left: believe liars and parked places again, and ask for less from now on. Returns false if there was
+    /// nothing to forgive.
     pub fn forgive(&mut self) -> bool {
         let any = !self.liars.is_empty() || self.hypotheses.iter().any(|h| h.parked_until > 0);
         self.liars.clear();
+        self.rigour *= 0.6;
         for hypothesis in &mut self.hypotheses {
             hypothesis.parked_until = 0;
         }

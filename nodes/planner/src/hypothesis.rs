@@ -1,6 +1,8 @@
 //! One place where the goal may be: a Gaussian over (x, y, yaw) of the base at the goal, and how far it is to be believed.
 
 use homing_core::{GoalHypothesis, PlanarPose, Stamp, wrap_angle};
+
+use crate::evidence::Evidence;
 use nalgebra::{Matrix3, Vector3};
 
 /// A view is a new one if the body moved or turned this much since the last.
@@ -8,8 +10,8 @@ const NEW_VIEW_M: f64 = 0.05;
 const NEW_VIEW_RAD: f64 = 0.09;
 /// What a view that is not new counts for.
 const STALE_VIEW: f64 = 0.2;
-/// Support does not grow beyond this, so that doubts still count.
-const SUPPORT_MAX: f64 = 600.0;
+/// Share of the old support that a new view replaces: what is seen now, from nearer, says more than what was seen often.
+const LEAK: f64 = 0.1;
 
 /// A measured goal pose in the odometry frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,8 +22,8 @@ pub struct Measurement {
     pub pose: PlanarPose,
     /// Covariance of (x, y, yaw), m and rad.
     pub covariance: Matrix3<f64>,
-    /// Matches that agree.
-    pub n_inliers: usize,
+    /// What stands behind it.
+    pub evidence: Evidence,
     /// Pose of the base when the image was taken, odometry frame.
     pub from: PlanarPose,
     /// Distance from the robot when the image was taken, metres.
@@ -68,8 +70,8 @@ impl Hypothesis {
             pose: measurement.pose,
             covariance: measurement.covariance,
             n_fused: 1,
-            support: measurement.n_inliers as f64,
-            n_inliers_best: measurement.n_inliers,
+            support: measurement.evidence.n_inliers as f64,
+            n_inliers_best: measurement.evidence.n_inliers,
             last_seen: measurement.stamp,
             last_seen_step: step,
             nearest_m: measurement.range_m,
@@ -104,9 +106,9 @@ impl Hypothesis {
         self.covariance = symmetric(&covariance);
         self.shift(&correction);
         self.n_fused += 1;
-        self.support = (self.support + novelty * measurement.n_inliers as f64).min(SUPPORT_MAX);
+        self.support = self.support * (1.0 - LEAK * novelty) + novelty * measurement.evidence.n_inliers as f64;
         self.seen_from = measurement.from;
-        self.n_inliers_best = self.n_inliers_best.max(measurement.n_inliers);
+        self.n_inliers_best = self.n_inliers_best.max(measurement.evidence.n_inliers);
         self.last_seen = self.last_seen.max(measurement.stamp);
         self.last_seen_step = step;
         self.nearest_m = self.nearest_m.min(measurement.range_m);

@@ -7,7 +7,7 @@ use crate::hypothesis::Hypothesis;
 /// When a goal estimate is worth driving to.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct SwitchConfig {
-    /// SLING's n_th: matches that must agree, in one estimate or summed over estimates that agree with each other.
+    /// SLING's n_th: matches that must count (see [`crate::Evidence`]), in one estimate or summed over estimates that agree.
     pub n_inliers_min: usize,
     /// SLING's d_th: a goal predicted farther away than this is not driven to, metres.
     pub distance_max_m: f64,
@@ -21,7 +21,7 @@ pub struct SwitchConfig {
 
 impl Default for SwitchConfig {
     fn default() -> Self {
-        Self { n_inliers_min: 20, distance_max_m: 4.0, far_factor: 2.0, unseen_steps_max: 150, parked_steps: 40 }
+        Self { n_inliers_min: 15, distance_max_m: 4.0, far_factor: 2.0, unseen_steps_max: 150, parked_steps: 40 }
     }
 }
 

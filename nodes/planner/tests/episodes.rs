@@ -19,45 +19,52 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
+fn episodes(seeds: core::ops::Range<u64>, discovery: fn() -> Box<dyn GoalDiscovery>) -> Vec<Outcome> {
+    let seeds: Vec<u64> = seeds.collect();
+    std::thread::scope(|scope| {
+        let halves: Vec<_> = seeds
+            .chunks(seeds.len().div_ceil(2))
+            .map(|half| scope.spawn(move || half.iter().map(|&seed| episode(seed, discovery())).collect::<Vec<_>>()))
+            .collect();
+        halves.into_iter().flat_map(|half| half.join().unwrap()).collect()
+    })
+}
+
 #[test]
-fn frontier_finds_the_goal_and_straight_seldom_does() {
-    let n: u64 = std::env::var("N").map_or(40, |v| v.parse().unwrap());
-    let frontier: Vec<Outcome> = (0..n).map(|seed| episode(seed, Box::new(Frontier::default()))).collect();
+fn frontier_finds_the_goal_on_a_shorter_way_than_straight() {
+    compare(20);
+}
+
+#[test]
+#[ignore = "a minute of computing: the same on more layouts"]
+fn frontier_finds_the_goal_in_more_layouts() {
+    compare(100);
+}
+
+fn compare(n: u64) {
+    let frontier = episodes(0..n, || Box::new(Frontier::default()));
     for (seed, o) in frontier.iter().enumerate() {
         println!(
-            "{seed:3} {} steps {:3} path {:5.1} of {:4.1} spl {:.2} final {:.2} m {:4.1} deg worst {:4.1} ms mean {:4.1} ms {:?} {}",
+            "{seed:3} {} steps {:3} path {:5.1} of {:4.1} m, final {:.2} m {:4.1} deg, {:.1} ms a step: {}",
             if o.success { "ok  " } else { "FAIL" },
             o.steps,
             o.path_m,
             o.shortest_m,
-            o.spl(),
             o.final_m,
             o.final_rad.to_degrees(),
-            o.worst_ms,
             o.total_ms / o.steps as f64,
-            o.mode,
             o.reason
         );
     }
-    let straight: Vec<Outcome> = (0..n).map(|seed| episode(seed, Box::new(Straight::new()))).collect();
+    let straight = episodes(0..n / 3, || Box::new(Straight::new()));
     let rate = |all: &[Outcome]| all.iter().filter(|o| o.success).count() as f64 / all.len() as f64;
     let spl = |all: &[Outcome]| all.iter().map(Outcome::spl).sum::<f64>() / all.len() as f64;
     let of = |value: fn(&Outcome) -> f64| median(frontier.iter().filter(|o| o.success).map(value).collect());
-    println!(
-        "frontier {:.3} spl {:.3}; straight {:.3} spl {:.3}",
-        rate(&frontier),
-        spl(&frontier),
-        rate(&straight),
-        spl(&straight)
-    );
-    println!(
-        "final: {:.3} m, {:.2} deg; steps {}",
-        of(|o| o.final_m),
-        of(|o| o.final_rad).to_degrees(),
-        of(|o| o.steps as f64)
-    );
-    assert!(rate(&frontier) >= 0.9);
-    assert!(rate(&straight) < rate(&frontier));
+    let (best, plain) = (rate(&frontier), rate(&straight));
+    println!("frontier {best:.3} spl {:.3}; straight {plain:.3} spl {:.3}", spl(&frontier), spl(&straight));
+    println!("final: {:.3} m, {:.2} deg", of(|o| o.final_m), of(|o| o.final_rad).to_degrees());
+    assert!(best >= 0.9);
+    assert!(spl(&straight) < 0.75 * spl(&frontier));
     assert!(of(|o| o.final_m) <= 0.15);
     assert!(of(|o| o.final_rad).to_degrees() <= 5.0);
 }

@@ -139,12 +139,16 @@ fn a_route_leads_around_a_wall_and_keeps_its_distance() {
     assert_eq!(no_path.why, "it is cut off from the robot");
 }
 
+fn sure(n_inliers: usize) -> Evidence {
+    Evidence { n_inliers, n_cells: None }
+}
+
 fn seen(filter: &GoalFilter, from: PlanarPose, goal: PlanarPose, n_inliers: usize) -> Measurement {
     let (a, b): (Transform<Odom, Base>, Transform<Odom, Base>) = (from.to_transform(), goal.to_transform());
     let mount = World::t_base_camera();
     let camera_goal = mount.inverse() * (a.inverse() * b) * mount;
     let t_camera_goal: Transform<Camera, Goal> = Transform::new(*camera_goal.isometry());
-    filter.measure(Stamp(1), &a, &mount, &t_camera_goal, &(Matrix6::identity() * 1e-4), n_inliers).unwrap()
+    filter.measure(Stamp(1), &a, &mount, &t_camera_goal, &(Matrix6::identity() * 1e-4), sure(n_inliers)).unwrap()
 }
 
 #[test]
@@ -170,7 +174,7 @@ fn a_place_that_lied_is_believed_again_only_on_much_better_evidence() {
     let mut filter = GoalFilter::new(FilterConfig::default());
     let place = PlanarPose { x_m: 0.4, y_m: 0.0, yaw_rad: 0.0 };
     filter.join(&seen(&filter, LEVEL, place, 40), 1);
-    let doubts = (0..4).map(|_| filter.doubt(&LEVEL, View::Clear, 1)).collect::<Vec<_>>();
+    let doubts = (0..4).map(|_| filter.doubt(&LEVEL, Sightline::Clear, 1)).collect::<Vec<_>>();
     assert_eq!(doubts.last(), Some(&Doubt::Refuted));
     filter.condemn(1);
     assert!(filter.best(1).is_none());
@@ -194,10 +198,22 @@ fn hypotheses_are_bounded() {
                 &World::t_base_camera(),
                 &Transform::from_rotation(&nalgebra::Matrix3::identity(), Vector3::new(f64::NAN, 0.0, 0.0)),
                 &Matrix6::identity(),
-                10
+                sure(10)
             )
             .is_none()
     );
+}
+
+#[test]
+fn many_matches_on_a_small_patch_do_not_make_an_arrival() {
+    let mut filter = GoalFilter::new(FilterConfig::default());
+    let here = PlanarPose { x_m: 0.1, y_m: 0.0, yaw_rad: 0.0 };
+    let mut patch = seen(&filter, LEVEL, here, 200);
+    patch.evidence.n_cells = Some(5);
+    assert_eq!(filter.join(&patch, 1), Joined::Weak, "at the goal the whole view should match");
+    let mut far = seen(&filter, LEVEL, PlanarPose { x_m: 2.5, ..LEVEL }, 20);
+    far.evidence.n_cells = Some(5);
+    assert_eq!(filter.join(&far, 2), Joined::Opened, "from afar a patch is all there is");
 }
 
 #[test]

@@ -8,7 +8,8 @@ use homing_core::{
 use super::{Decision, HINT_STEPS, HINTS_MAX, ODOMETRY_KEPT, Planner, REJECTED_MAX};
 use crate::angles::distance;
 use crate::event::PlannerObservation;
-use crate::goal_filter::{Doubt, Joined, View, camera_azimuth};
+use crate::evidence::{View, weigh};
+use crate::goal_filter::{Doubt, Joined, Sightline, camera_azimuth};
 use crate::mapper::Integrated;
 use crate::progress::jumped;
 
@@ -75,20 +76,24 @@ impl Planner {
                 self.hint(&pose, bearing_rad, *n_inliers);
             }
             Sighting::Pose { t_camera_goal, covariance, n_inliers, .. } => {
+                // Depth tells the floor only in the image that the matches belong to.
+                let same = estimate.stamp == observation.odometry.stamp;
+                let view = same.then_some(View { depth: &observation.depth, t_base_camera });
+                let evidence = weigh(*n_inliers, &estimate.matched_points, &observation.intrinsics, view.as_ref());
                 let measured = self.filter.measure(
                     estimate.stamp,
                     &t_odom_base,
                     t_base_camera,
                     t_camera_goal,
                     covariance,
-                    *n_inliers,
+                    evidence,
                 );
                 let Some(measured) = measured else { return };
                 let joined = self.filter.join(&measured, step);
                 agreed = joined == Joined::Fused && self.filter.best(step).map(|h| h.n_fused) != before;
-                if joined != Joined::Refused {
+                if matches!(joined, Joined::Fused | Joined::Opened) {
                     let away = libm::atan2(measured.pose.y_m - pose.y_m, measured.pose.x_m - pose.x_m);
-                    self.hint(&pose, away, *n_inliers);
+                    self.hint(&pose, away, evidence.n_inliers);
                 }
             }
         }
@@ -119,12 +124,12 @@ impl Planner {
 }
 
 /// Whether an obstacle of the map stands on the straight line between two points.
-fn clear_view(map: &OccupancyGrid, from_m: (f64, f64), to_m: (f64, f64)) -> View {
+fn clear_view(map: &OccupancyGrid, from_m: (f64, f64), to_m: (f64, f64)) -> Sightline {
     let n = (distance(from_m, to_m) / map.geometry.resolution_m).ceil().clamp(1.0, 1000.0) as u32;
     let hidden = (1..n).any(|i| {
         let share = f64::from(i) / f64::from(n);
         let (x, y) = (from_m.0 + share * (to_m.0 - from_m.0), from_m.1 + share * (to_m.1 - from_m.1));
         map.geometry.cell_at(x, y).is_some_and(|(c, r)| map.at(c, r) == Cell::Occupied)
     });
-    if hidden { View::Hidden } else { View::Clear }
+    if hidden { Sightline::Hidden } else { Sightline::Clear }
 }

@@ -65,7 +65,7 @@ impl World {
                 rng: ChaCha8Rng::seed_from_u64(seed ^ 0x5eed),
                 clock: Stamp(1_000_000_000),
                 faults,
-                image: (160, 120),
+                image: (128, 96),
                 path_m: 0.0,
             };
             for _ in 0..40 {
@@ -147,7 +147,7 @@ impl World {
                     data[row as usize * width + column] = depth as f32;
                     row -= 1;
                 }
-                z += 0.02;
+                z += 0.03;
             }
         }
         DepthImage::from_metres(width as u32, height as u32, data).unwrap()
