@@ -4,7 +4,6 @@
     missing_docs,
     clippy::all,
     clippy::unwrap_used,
-    unused_imports,
     reason = "generated from .msg files, which hold the documentation"
 )]
 mod generated {

@@ -92,10 +92,23 @@ impl<M: Message> Publisher<M> {
     /// # Errors
     /// [`PublishError::Put`] when the session is closed.
     pub fn publish(&self, message: &M) -> Result<(), PublishError> {
+        self.put(self.payload(message))
+    }
+
+    /// Sends bytes as they are, for tests of what receivers make of malformed ones.
+    ///
+    /// # Errors
+    /// [`PublishError::Put`] when the session is closed.
+    #[doc(hidden)]
+    pub fn publish_bytes(&self, bytes: Vec<u8>) -> Result<(), PublishError> {
+        self.put(bytes.into())
+    }
+
+    fn put(&self, payload: ZBytes) -> Result<(), PublishError> {
         let sequence = self.sequence.fetch_add(1, Ordering::Relaxed);
         let attachment = wire::attachment(sequence, unix_time_ns(), &self.gid);
         self.inner
-            .put(self.payload(message))
+            .put(payload)
             .attachment(&attachment[..])
             .wait()
             .map_err(|e| PublishError::Put { topic: self.topic, cause: e.to_string() })

@@ -1,6 +1,7 @@
 //! What the tests across crates share: where things are, and real processes on a network of their own.
 #![expect(clippy::unwrap_used, reason = "test support may fail by panicking")]
 
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 
 /// Root of the repository.
@@ -12,4 +13,19 @@ pub fn repository() -> &'static Path {
 pub fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("HOMING_DATA").map_or_else(|| repository().join("../shared/data"), PathBuf::from);
     folder.is_dir().then_some(folder)
+}
+
+/// A TCP port nobody listens on.
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// The Python of the private environment that `deploy/` makes, or what HOMING_PYTHON names. Says so where there is none.
+pub fn python() -> Option<PathBuf> {
+    let python = std::env::var_os("HOMING_PYTHON").map_or_else(|| repository().join(".venv/bin/python"), PathBuf::from);
+    if !python.is_file() {
+        println!("SKIPPED: {} is not there; ./deploy/test makes it", python.display());
+        return None;
+    }
+    Some(python)
 }

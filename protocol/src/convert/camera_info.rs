@@ -43,6 +43,10 @@ impl ToDomain<CameraInfoMessage> for CameraInfo {
         if skew != 0.0 {
             return Err(Malformed::new(NAME, format!("skew of {skew} is not supported")));
         }
+        if self.binning_x > 1 || self.binning_y > 1 {
+            let (x, y) = (self.binning_x, self.binning_y);
+            return Err(Malformed::new(NAME, format!("binning of {x}x{y}: send the intrinsics of the image as it is")));
+        }
         let intrinsics = Intrinsics::new(self.width, self.height, fx, fy, cx, cy)
             .map_err(|e| Malformed::new(NAME, e.to_string()))?;
         Ok(CameraInfoMessage { stamp, intrinsics })

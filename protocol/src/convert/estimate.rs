@@ -65,11 +65,14 @@ impl ToMessage<homing_msgs::GoalEstimate> for GoalEstimate {
 
 impl ToDomain<GoalEstimate> for homing_msgs::GoalEstimate {
     fn to_domain(&self) -> Result<GoalEstimate, Malformed> {
-        if self.query_px.len() != self.goal_px.len() {
+        if self.query_px.len() != self.goal_px.len() || !self.query_px.len().is_multiple_of(2) {
             return Err(Malformed::new(
                 NAME,
                 format!("{} query and {} goal coordinates", self.query_px.len(), self.goal_px.len()),
             ));
+        }
+        if self.query_px.iter().chain(&self.goal_px).any(|c| !c.is_finite()) {
+            return Err(Malformed::new(NAME, "a matched point is not finite"));
         }
         let pairs = self.query_px.as_chunks::<2>().0.iter().zip(self.goal_px.as_chunks::<2>().0);
         Ok(GoalEstimate {
@@ -94,6 +97,14 @@ fn upper_triangle() -> impl Iterator<Item = (usize, usize)> {
     (0..6).flat_map(|row| (row..6).map(move |column| (row, column)))
 }
 
+/// A number that is finite and not negative.
+fn size(value: f64, field: &str) -> Result<f64, Malformed> {
+    if finite(value, field, NAME)? < 0.0 {
+        return Err(Malformed::new(NAME, format!("{field} is {value}: it cannot be negative")));
+    }
+    Ok(value)
+}
+
 fn sighting(message: &homing_msgs::GoalEstimate) -> Result<Sighting, Malformed> {
     let n_inliers = message.n_inliers as usize;
     match message.kind {
@@ -103,7 +114,7 @@ fn sighting(message: &homing_msgs::GoalEstimate) -> Result<Sighting, Malformed> 
         },
         BEARING => Ok(Sighting::Bearing {
             bearing_rad: finite(message.bearing_rad, "bearing_rad", NAME)?,
-            bearing_sd_rad: finite(message.bearing_sd_rad, "bearing_sd_rad", NAME)?,
+            bearing_sd_rad: size(message.bearing_sd_rad, "bearing_sd_rad")?,
             heading_rad: finite(message.heading_rad, "heading_rad", NAME)?,
             n_inliers,
         }),
@@ -118,7 +129,7 @@ fn sighting(message: &homing_msgs::GoalEstimate) -> Result<Sighting, Malformed> 
             if covariance.iter().any(|v| !v.is_finite()) || covariance.diagonal().iter().any(|v| *v < 0.0) {
                 return Err(Malformed::new(NAME, "covariance is not finite, or negative on its diagonal"));
             }
-            let rms_rad = finite(message.rms_rad, "rms_rad", NAME)?;
+            let rms_rad = size(message.rms_rad, "rms_rad")?;
             Ok(Sighting::Pose { t_camera_goal, covariance, n_inliers, rms_rad })
         }
         other => Err(Malformed::new(NAME, format!("kind {other} does not exist"))),

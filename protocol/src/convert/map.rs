@@ -44,6 +44,10 @@ impl ToDomain<OccupancyGrid> for nav_msgs::OccupancyGrid {
         if !(resolution_m > 0.0 && resolution_m.is_finite()) {
             return Err(Malformed::new(NAME, format!("resolution is {resolution_m} m")));
         }
+        let q = &self.info.origin.orientation;
+        if q.x != 0.0 || q.y != 0.0 || q.z != 0.0 {
+            return Err(Malformed::new(NAME, "the map is turned; its axes must be those of its frame"));
+        }
         let geometry = GridGeometry {
             width: width as usize,
             height: height as usize,

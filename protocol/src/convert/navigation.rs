@@ -51,7 +51,6 @@ impl ToDomain<NavigationState> for homing_msgs::NavigationState {
         let action = ACTIONS
             .get(usize::from(self.action))
             .ok_or_else(|| Malformed::new(NAME, format!("action {} does not exist", self.action)))?;
-        let pairs = |flat: &[f64]| flat.as_chunks::<2>().0.iter().map(|p| (p[0], p[1])).collect();
         Ok(NavigationState {
             stamp: stamp(&self.header.stamp, NAME)?,
             step: self.step,
@@ -59,15 +58,30 @@ impl ToDomain<NavigationState> for homing_msgs::NavigationState {
             action: *action,
             pose: pose(self.x_m, self.y_m, self.yaw_rad)?,
             goal: if self.goal_known { Some(goal(self)?) } else { None },
-            target_m: self.has_target.then_some((self.target_x_m, self.target_y_m)),
-            path_m: pairs(&self.path_m),
-            frontiers_m: pairs(&self.frontiers_m),
+            target_m: if self.has_target { Some(target(self)?) } else { None },
+            path_m: pairs(&self.path_m, "path_m")?,
+            frontiers_m: pairs(&self.frontiers_m, "frontiers_m")?,
             reason: self.reason.clone(),
         })
     }
 }
 
+fn target(message: &homing_msgs::NavigationState) -> Result<(f64, f64), Malformed> {
+    Ok((finite(message.target_x_m, "target_x_m", NAME)?, finite(message.target_y_m, "target_y_m", NAME)?))
+}
+
+fn pairs(flat: &[f64], field: &str) -> Result<Vec<(f64, f64)>, Malformed> {
+    let (points, rest) = flat.as_chunks::<2>();
+    if !rest.is_empty() {
+        return Err(Malformed::new(NAME, format!("{field} has {} numbers, which make no pairs", flat.len())));
+    }
+    points.iter().map(|[x, y]| Ok((finite(*x, field, NAME)?, finite(*y, field, NAME)?))).collect()
+}
+
 fn goal(message: &homing_msgs::NavigationState) -> Result<GoalHypothesis, Malformed> {
+    for value in message.goal_covariance {
+        finite(value, "goal_covariance", NAME)?;
+    }
     Ok(GoalHypothesis {
         pose: pose(message.goal_x_m, message.goal_y_m, message.goal_yaw_rad)?,
         covariance: Matrix3::from_row_slice(&message.goal_covariance),
