@@ -23,6 +23,10 @@ pub struct Gates {
     pub inlier_share_min: f64,
     /// Largest angular error of a verified match, radians.
     pub error_rad_max: f64,
+    /// Fewest patches of the photo that the frame, drawn from the pose, must cover with contrast.
+    pub n_patches_min: usize,
+    /// Smallest share of them that must look like the photo.
+    pub patch_share_min: f64,
     /// Fewest verified matches of a bearing without depth: a line binds a match less than a point.
     pub n_bearing_min: usize,
     /// Smallest share of the matches that a bearing must explain.
@@ -38,6 +42,8 @@ impl Default for Gates {
             n_inliers_min: 10,
             inlier_share_min: 0.1,
             error_rad_max: 0.008,
+            n_patches_min: 12,
+            patch_share_min: 0.6,
             n_bearing_min: 25,
             bearing_share_min: 0.4,
         }
@@ -66,6 +72,8 @@ pub struct PerceptionConfig {
     pub confidence: f64,
     /// Most samples RANSAC draws.
     pub iterations_max: usize,
+    /// Poses tried for one frame: those before the last were not borne out by the photo.
+    pub hypotheses_max: u32,
     /// Rounds of guided matching after the first pose: the second looks from the pose the first one refined.
     pub guided_rounds: u32,
     /// Seed of RANSAC's samples; each frame mixes its stamp into it.
@@ -86,6 +94,7 @@ impl Default for PerceptionConfig {
             gates: Gates::default(),
             confidence: 0.9999,
             iterations_max: 10_000,
+            hypotheses_max: 5,
             guided_rounds: 2,
             seed: 0,
             threads: None,
@@ -111,6 +120,9 @@ impl PerceptionConfig {
             ("n_inliers_min", g.n_inliers_min as f64, (4.0, 10_000.0), "4..=10000"),
             ("inlier_share_min", g.inlier_share_min, (0.0, 1.0), "0..=1"),
             ("error_rad_max", g.error_rad_max, (1e-5, 0.2), "0.00001..=0.2 rad"),
+            ("n_patches_min", g.n_patches_min as f64, (0.0, 10_000.0), "0..=10000"),
+            ("patch_share_min", g.patch_share_min, (0.0, 1.0), "0..=1"),
+            ("hypotheses_max", f64::from(self.hypotheses_max), (1.0, 100.0), "1..=100"),
             ("n_bearing_min", g.n_bearing_min as f64, (6.0, 10_000.0), "6..=10000"),
             ("bearing_share_min", g.bearing_share_min, (0.0, 1.0), "0..=1"),
             ("confidence", self.confidence, (0.5, 1.0 - 1e-12), "0.5..1"),

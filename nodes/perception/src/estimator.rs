@@ -10,6 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::locate::{Found, Views, locate};
+use crate::synthesis::{Seen, Thumbnail};
 use crate::{MutualNearest, PerceptionConfig, PerceptionError, Sift};
 
 /// Verified matches handed on for people to look at.
@@ -26,6 +27,7 @@ pub struct GoalEstimator<E = Sift, M = MutualNearest> {
 struct Goal {
     photo: GoalPhoto,
     features: Features,
+    thumbnail: Thumbnail,
 }
 
 impl GoalEstimator {
@@ -69,7 +71,8 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
         }
         let features = self.extract(&photo.rgb)?;
         tracing::debug!(goal = photo.id, keypoints = features.keypoints.len(), "goal photo taken");
-        self.goal = Some(Goal { photo, features });
+        let thumbnail = Thumbnail::of(&photo.rgb);
+        self.goal = Some(Goal { photo, features, thumbnail });
         Ok(())
     }
 
@@ -103,12 +106,15 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
         let Some(goal) = &self.goal else { return Ok(unseen(frame, 0, UnseenReason::NoGoal)) };
         let matches = timed(&mut times.matching, || self.matcher.match_features(&query, &goal.features))
             .map_err(|source| stage(self.matcher.name(), source))?;
+        let grey = frame.rgb.to_luma();
         let views = Views {
             query: &query,
             goal: &goal.features,
             depth: &frame.depth,
             camera: &frame.intrinsics,
             goal_camera: &goal.photo.intrinsics,
+            seen: Seen { grey: &grey, depth: &frame.depth, camera: &frame.intrinsics },
+            photo: &goal.thumbnail,
         };
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed ^ frame.stamp.0);
         let Found { sighting, verified } = timed(&mut times.pose, || locate(&views, &matches, &self.config, &mut rng))?;

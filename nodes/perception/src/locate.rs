@@ -14,6 +14,7 @@ use crate::lift::lift;
 use crate::pnp::{
     CameraPose, Correspondence, EPNP_GATE_PX, PoseEstimate, RansacConfig, covariance, epnp_ransac, lo_ransac, refine,
 };
+use crate::synthesis::{Seen, Thumbnail, agreement};
 
 /// Radius of the search around a prediction, in units of the inlier gate: the first pose may be off by more than the
 /// noise of a keypoint.
@@ -26,6 +27,8 @@ pub(crate) struct Views<'a> {
     pub depth: &'a DepthImage,
     pub camera: &'a Intrinsics,
     pub goal_camera: &'a Intrinsics,
+    pub seen: Seen<'a>,
+    pub photo: &'a Thumbnail,
 }
 
 /// A sighting and the (query, goal) keypoints that support it.
@@ -50,11 +53,12 @@ pub(crate) fn locate(
         return Ok(unseen(UnseenReason::TooFewMatches));
     }
     let (pairs, correspondences) = views.correspondences(&matches, config);
-    if let Some(estimate) = solve(views, &correspondences, config, rng)? {
-        return Ok(match config.solver {
-            PoseSolver::LoRansac => guided_pose(views, &pairs, estimate, config),
-            PoseSolver::EpnpRansac => found_pose(&pairs, &estimate),
-        });
+    let found = match config.solver {
+        PoseSolver::LoRansac => proven_pose(views, pairs.clone(), correspondences, config, rng),
+        PoseSolver::EpnpRansac => published_pose(views, &pairs, &correspondences, config)?,
+    };
+    if let Some(found) = found {
+        return Ok(found);
     }
     // Depth is missing where it matters: fewer than half of the matches could be lifted.
     if 2 * pairs.len() < matches.len()
@@ -105,13 +109,45 @@ fn five_point_samples(config: &PerceptionConfig) -> usize {
     (needed.ceil() as usize).clamp(1, config.iterations_max)
 }
 
+/// The first pose that enough matches agree on and that the photo bears out. What repeats in a flat agrees on poses that
+/// are wrong: the matches behind each of those are set aside, and the rest is searched again.
+fn proven_pose(
+    views: &Views<'_>,
+    mut pairs: Vec<(usize, usize)>,
+    mut correspondences: Vec<Correspondence>,
+    config: &PerceptionConfig,
+    rng: &mut impl Rng,
+) -> Option<Found> {
+    for _ in 0..config.hypotheses_max {
+        let estimate =
+            robust_pose(&correspondences, config, rng).and_then(|p| verified(p, &correspondences, config))?;
+        let (pose, found) = guided_pose(views, &pairs, &estimate, config);
+        let agreement = agreement(&views.seen, views.photo, views.goal_camera, &pose);
+        let gates = &config.gates;
+        if agreement.n_patches >= gates.n_patches_min && agreement.share >= gates.patch_share_min {
+            return Some(found);
+        }
+        // From the back, so that the indices before stay what they were; they ascend.
+        for &i in estimate.inliers.iter().rev() {
+            pairs.remove(i);
+            correspondences.remove(i);
+        }
+    }
+    None
+}
+
 /// Matches once more where the pose says to look, and refines on what is found.
-fn guided_pose(views: &Views<'_>, pairs: &[(usize, usize)], first: PoseEstimate, config: &PerceptionConfig) -> Found {
+fn guided_pose(
+    views: &Views<'_>,
+    pairs: &[(usize, usize)],
+    first: &PoseEstimate,
+    config: &PerceptionConfig,
+) -> (CameraPose, Found) {
     let similarity_min = weakest_of_most(views, first.inliers.iter().map(|&i| pairs[i]));
     let points: Vec<_> = (0..views.query.keypoints.len()).filter_map(|q| Some((q, views.point(q, config)?))).collect();
     let goal_rays: Vec<_> = (0..views.goal.keypoints.len()).map(|g| views.goal_ray(g).into_inner()).collect();
     let scene = Scene { query: views.query, goal: views.goal, points: &points, goal_rays: &goal_rays };
-    let mut best = found_pose(pairs, &first);
+    let mut best = (first.pose, found_pose(pairs, first));
     let mut pose = first.pose;
     let mut n_best = first.inliers.len();
     for _ in 0..config.guided_rounds {
@@ -124,7 +160,7 @@ fn guided_pose(views: &Views<'_>, pairs: &[(usize, usize)], first: PoseEstimate,
             break;
         }
         n_best = estimate.inliers.len();
-        best = found_pose(&pairs, &estimate);
+        best = (pose, found_pose(&pairs, &estimate));
     }
     best
 }
@@ -182,20 +218,19 @@ fn ray(camera: &Intrinsics, keypoint: &homing_core::Keypoint) -> Unit<Vector3<f6
     Unit::new_unchecked(camera.ray(f64::from(keypoint.x_px), f64::from(keypoint.y_px)))
 }
 
-/// Pose from 2D-3D correspondences (SLING eq. 2), `None` unless it passes the gates.
-fn solve(
+/// OpenCV's EPnP + RANSAC as SLING's code calls it, `None` unless it passes the gates.
+fn published_pose(
     views: &Views<'_>,
+    pairs: &[(usize, usize)],
     correspondences: &[Correspondence],
     config: &PerceptionConfig,
-    rng: &mut impl Rng,
-) -> Result<Option<PoseEstimate>, PerceptionError> {
-    let pose = match config.solver {
-        PoseSolver::LoRansac => robust_pose(correspondences, config, rng),
-        PoseSolver::EpnpRansac => epnp_ransac(correspondences, EPNP_GATE_PX / views.goal_camera.fx())?,
-    };
-    Ok(pose.and_then(|pose| verified(pose, correspondences, config)))
+) -> Result<Option<Found>, PerceptionError> {
+    let pose = epnp_ransac(correspondences, EPNP_GATE_PX / views.goal_camera.fx())?;
+    let estimate = pose.and_then(|pose| verified(pose, correspondences, config));
+    Ok(estimate.map(|estimate| found_pose(pairs, &estimate)))
 }
 
+/// Pose from 2D-3D correspondences (SLING eq. 2).
 fn robust_pose(
     correspondences: &[Correspondence],
     config: &PerceptionConfig,
