@@ -1,5 +1,6 @@
 //! What every process does at its start and end: read its one configuration file, say what holds, and stop when told.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -76,6 +77,16 @@ impl Default for SessionSettings {
 }
 
 impl SessionSettings {
+    /// As the session of a body: it listens, on the default endpoint if none is named, unless told to connect.
+    #[must_use]
+    pub fn body(&self) -> SessionConfig {
+        let listen = match (&self.listen, &self.connect) {
+            (None, None) => Some(vec![DEFAULT_ENDPOINT.to_owned()]),
+            _ => self.listen.clone(),
+        };
+        Self { listen, ..self.clone() }.session("body")
+    }
+
     /// As a session of `node`: whoever does not listen connects, to the default endpoint if none is named.
     #[must_use]
     pub fn session(&self, node: &str) -> SessionConfig {
@@ -96,11 +107,12 @@ impl SessionSettings {
 
 /// Log lines go to stderr; RUST_LOG overrides what is shown.
 pub fn start_log() {
-    let filter = EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| EnvFilter::new("info,zenoh=error,zenoh_transport=error,zenoh_shm=error,hiroz=error"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
+        EnvFilter::new("info,zenoh=error,zenoh_transport=error,zenoh_shm=error,hiroz=error,re_log_types=error")
+    });
     // A second call in one process changes nothing.
-    let _ =
-        tracing_subscriber::fmt().with_env_filter(filter).with_target(false).with_writer(std::io::stderr).try_init();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_target(false);
+    let _ = log.with_ansi(std::io::stderr().is_terminal()).with_writer(std::io::stderr).try_init();
 }
 
 /// Waits for Ctrl-C or SIGTERM.

@@ -158,6 +158,6 @@ fn transport(qos: Qos) -> (CongestionControl, Priority, bool) {
 }
 
 /// ROS tools show this; nothing here acts on it.
-fn unix_time_ns() -> i64 {
+pub(crate) fn unix_time_ns() -> i64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX))
 }

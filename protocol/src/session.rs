@@ -72,9 +72,7 @@ impl SessionConfig {
 #[derive(Debug, Error)]
 pub enum SessionError {
     /// The endpoint to listen on is taken or not ours.
-    #[error(
-        "cannot listen on {endpoints}: {cause}. Is another robot or simulator running there? Choose another port with --listen"
-    )]
+    #[error("cannot listen on {endpoints}: {cause}. Is another robot or simulator running there? Choose another port")]
     Listen {
         /// The endpoints asked for.
         endpoints: String,
@@ -83,7 +81,7 @@ pub enum SessionError {
     },
     /// Nobody answers.
     #[error(
-        "no robot answers at {endpoints} within {waited_s} s: {cause}. Start the robot or simulator first, or give its address with --connect"
+        "no robot answers at {endpoints} within {waited_s} s: {cause}. Start the robot or simulator first, or give its address"
     )]
     Connect {
         /// The endpoints asked for.
@@ -184,6 +182,13 @@ impl Session {
             .len()
     }
 
+    /// The zenoh session underneath, for this crate's own measurements.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn zenoh(&self) -> &zenoh::Session {
+        self.node.session()
+    }
+
     /// The node, for services and actions of this crate.
     pub(crate) fn node(&self) -> &Arc<ZNode> {
         &self.node
@@ -215,7 +220,9 @@ fn shm_provider() -> Option<Arc<ShmProvider<PosixShmProviderBackend>>> {
 }
 
 fn open_error(config: &SessionConfig, cause: &zenoh::Error) -> SessionError {
-    let cause = cause.to_string();
+    // zenoh adds places in its own sources; what happened stands before them.
+    let text = cause.to_string();
+    let cause = text.split(" at /").next().unwrap_or(&text).to_owned();
     match &config.link {
         Link::Listen(endpoints) => SessionError::Listen { endpoints: endpoints.join(", "), cause },
         Link::Connect(endpoints) => {

@@ -13,7 +13,7 @@ use zenoh::bytes::ZBytes;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::sample::Sample;
 
-use crate::publisher::endpoint;
+use crate::publisher::{endpoint, unix_time_ns};
 use crate::topics::{Message, Topic};
 use crate::wire;
 
@@ -57,6 +57,10 @@ pub struct Received<M> {
     pub message: M,
     /// The sender's count of messages, if it gave one.
     pub sequence: Option<i64>,
+    /// When it was sent by the sender's wall clock, ns since 1970, if it said so. Means something on one host only.
+    pub sent_unix_ns: Option<i64>,
+    /// When it arrived by this host's wall clock, ns since 1970.
+    pub arrived_unix_ns: i64,
     /// Size on the wire.
     pub bytes: usize,
 }
@@ -89,8 +93,14 @@ struct Slot {
 
 #[derive(Default)]
 struct Waiting {
-    samples: VecDeque<(ZBytes, Option<i64>)>,
+    samples: VecDeque<Arrival>,
     counts: Counts,
+}
+
+struct Arrival {
+    payload: ZBytes,
+    sequence_and_time: Option<(i64, i64)>,
+    unix_ns: i64,
 }
 
 impl Slot {
@@ -101,14 +111,15 @@ impl Slot {
 
     /// Runs on zenoh's thread: only swaps pointers.
     fn store(&self, sample: &Sample) {
-        let sequence = sample.attachment().and_then(|a| wire::read_attachment(&a.to_bytes())).map(|(n, _)| n);
+        let sequence_and_time = sample.attachment().and_then(|a| wire::read_attachment(&a.to_bytes()));
+        let arrival = Arrival { payload: sample.payload().clone(), sequence_and_time, unix_ns: unix_time_ns() };
         let mut waiting = self.lock();
         waiting.counts.arrived += 1;
         if waiting.samples.len() == self.depth {
             waiting.samples.pop_front();
             waiting.counts.displaced += 1;
         }
-        waiting.samples.push_back((sample.payload().clone(), sequence));
+        waiting.samples.push_back(arrival);
         drop(waiting);
         self.arrival.notify_one();
     }
@@ -143,20 +154,20 @@ impl<M: Message> Subscription<M> {
 
     /// The oldest message waiting, if there is one.
     pub fn try_recv(&self) -> Option<Result<Received<M>, ReceiveError>> {
-        let (payload, sequence) = self.slot.lock().samples.pop_front()?;
-        Some(self.read(&payload, sequence))
+        let arrival = self.slot.lock().samples.pop_front()?;
+        Some(self.read(&arrival))
     }
 
     /// The newest message waiting, if there is one; older ones are dropped and counted.
     pub fn try_latest(&self) -> Option<Result<Received<M>, ReceiveError>> {
-        let (payload, sequence) = {
+        let arrival = {
             let mut waiting = self.slot.lock();
             let newest = waiting.samples.pop_back()?;
             waiting.counts.displaced += waiting.samples.len() as u64;
             waiting.samples.clear();
             newest
         };
-        Some(self.read(&payload, sequence))
+        Some(self.read(&arrival))
     }
 
     /// Waits for the next message. Cancel-safe; bound it with `tokio::time::timeout`.
@@ -178,16 +189,22 @@ impl<M: Message> Subscription<M> {
         self.slot.lock().counts
     }
 
-    fn read(&self, payload: &ZBytes, sequence: Option<i64>) -> Result<Received<M>, ReceiveError> {
-        let bytes = payload.len();
+    fn read(&self, arrival: &Arrival) -> Result<Received<M>, ReceiveError> {
+        let bytes = arrival.payload.len();
         if bytes > self.bytes_max {
             return Err(ReceiveError::TooLarge { topic: self.topic, bytes, bytes_max: self.bytes_max });
         }
-        let message = wire::decode(payload).map_err(|cause| ReceiveError::Malformed {
+        let message = wire::decode(&arrival.payload).map_err(|cause| ReceiveError::Malformed {
             topic: self.topic,
             message: M::type_name(),
             cause,
         })?;
-        Ok(Received { message, sequence, bytes })
+        Ok(Received {
+            message,
+            sequence: arrival.sequence_and_time.map(|(n, _)| n),
+            sent_unix_ns: arrival.sequence_and_time.map(|(_, at)| at),
+            arrived_unix_ns: arrival.unix_ns,
+            bytes,
+        })
     }
 }

@@ -1,5 +1,7 @@
 //! CDR payloads and rmw_zenoh attachments.
 
+use std::borrow::Cow;
+
 use byteorder::{BigEndian, LittleEndian};
 use hiroz_cdr::{CdrBuffer, CdrReader, CdrWriter, ZBUF_DESER_SOURCE};
 use zenoh::bytes::ZBytes;
@@ -34,12 +36,16 @@ pub(crate) fn encode_into<M: Message>(message: &M, memory: &mut ZShmMut) -> bool
 
 /// Decodes a whole payload; trailing bytes beyond CDR's padding, and lengths beyond the payload, are refused.
 pub(crate) fn decode<M: Message>(payload: &ZBytes) -> Result<M, String> {
-    let bytes = payload.to_bytes();
+    // A payload in several pieces is put together once; byte arrays then refer to it instead of being copied again.
+    let whole = match payload.to_bytes() {
+        Cow::Borrowed(_) => payload.clone(),
+        Cow::Owned(bytes) => bytes.into(),
+    };
+    let bytes = whole.to_bytes();
     let Some((header, body)) = bytes.split_first_chunk::<4>() else {
         return Err(format!("{} bytes are too few for a CDR header", bytes.len()));
     };
-    // Byte arrays then refer to the payload instead of copying it.
-    ZBUF_DESER_SOURCE.with(|source| *source.borrow_mut() = Some(payload.clone().into()));
+    ZBUF_DESER_SOURCE.with(|source| *source.borrow_mut() = Some(whole.clone().into()));
     let decoded = match *header {
         CDR_LITTLE_ENDIAN => decode_body::<M, LittleEndian>(body),
         CDR_BIG_ENDIAN => decode_body::<M, BigEndian>(body),

@@ -18,6 +18,7 @@ use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, Finish, SceneRef, Score}
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::fleet::Fleet;
+use crate::latency::Stopwatch;
 use crate::mission::{self, Watched};
 use crate::run_folder::RunFolder;
 use crate::settings::{MonitorFile, Network, PerceptionFile, PlannerFile, PlannerPace, SimFile, TruthFile};
@@ -96,6 +97,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     let mut fleet = start(&args, &task, &folder)?;
     let session = join(&args, &mut fleet).await?;
     let mut scorer = Scorer { truths: session.subscribe(&GROUND_TRUTH, 64)?, last: None };
+    let mut stopwatch = Stopwatch::open(&session)?;
     let summary = session.publisher(&EPISODE_SUMMARY)?;
     all_ready(&session, &mut fleet).await?;
     bar.finish_and_clear();
@@ -103,6 +105,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     let bar = mission::bar(homing_sim::constants::STEPS_MAX);
     let watched = mission::drive(&session, &photo, &bar, || {
         scorer.listen();
+        stopwatch.listen();
         still_possible(&mut fleet, &bar)
     })
     .await;
@@ -129,7 +132,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
         recording: folder.file("episode.rrd"),
         picture: folder.file("episode.png"),
     };
-    let verdict = Verdict::new(&report, score.as_ref(), about);
+    let verdict = Verdict::new(&report, score.as_ref(), stopwatch.p50(), about);
     summary.publish(&message(&verdict))?;
     tokio::time::sleep(Duration::from_millis(500)).await;
     session.close();

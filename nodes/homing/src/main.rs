@@ -5,6 +5,7 @@ mod demo;
 mod doctor;
 mod fleet;
 mod goto;
+mod latency;
 mod mission;
 mod photo;
 mod replay;

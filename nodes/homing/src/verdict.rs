@@ -6,6 +6,7 @@ use homing_protocol::navigate::{MissionReport, Outcome};
 use homing_sim::Score;
 use serde::Serialize;
 
+use crate::latency::LatencyMs;
 use crate::run_folder::shown;
 
 /// The end of an episode. Keys that nobody can know (a photo of the user's own has no true pose) are null.
@@ -26,6 +27,8 @@ pub struct Verdict {
     pub scene: String,
     pub seed: u64,
     pub policy: &'static str,
+    /// From frame to goal estimate, medians over the episode.
+    pub latency_ms_p50: Option<LatencyMs>,
     pub recording: PathBuf,
     pub picture: PathBuf,
 }
@@ -73,6 +76,13 @@ impl Verdict {
         for (name, value) in self.facts() {
             println!("  {name:<20} {value}");
         }
+        if let Some(ms) = &self.latency_ms_p50 {
+            println!();
+            println!(
+                "  frame to estimate    {:.0} ms (p50 of {} frames): extract {:.0}, match {:.0}, pose {:.0}, the rest on the way {:.0}",
+                ms.frame_to_estimate, ms.n_frames, ms.extract, ms.matching, ms.pose, ms.transport
+            );
+        }
         println!();
         println!("  picture              {}", shown(&self.picture));
         println!("  recording            {}   (look at it: rerun {})", shown(&self.recording), shown(&self.recording));
@@ -80,7 +90,7 @@ impl Verdict {
     }
 
     /// What the planner said, with or without a score.
-    pub fn new(report: &MissionReport, score: Option<&Score>, about: About) -> Self {
+    pub fn new(report: &MissionReport, score: Option<&Score>, latency_ms_p50: Option<LatencyMs>, about: About) -> Self {
         Self {
             success: score.map_or(report.outcome == Outcome::Arrived, |s| s.success),
             steps: score.map_or(report.steps, |s| s.steps),
@@ -94,6 +104,7 @@ impl Verdict {
             scene: about.scene,
             seed: about.seed,
             policy: about.policy,
+            latency_ms_p50,
             recording: about.recording,
             picture: about.picture,
         }

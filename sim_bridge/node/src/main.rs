@@ -48,7 +48,7 @@ fn main() -> ExitCode {
 async fn run(config: Config) -> anyhow::Result<()> {
     tracing::info!(?config, "effective configuration");
     // The port first: a taken one is known at once, before a scene is built.
-    let session = Session::open(&config.session.session("body"))?;
+    let session = Session::open(&config.session.body())?;
     let world = tokio::task::block_in_place(|| World::open(&config))?;
     match config.pace {
         Pace::Lockstep => lockstep::run(&session, world).await?,

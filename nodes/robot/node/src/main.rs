@@ -43,7 +43,7 @@ fn main() -> ExitCode {
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
     tracing::info!(?config, "effective configuration");
-    let session = Session::open(&config.session.session("body"))?;
+    let session = Session::open(&config.session.body())?;
     let recording = Recording::open(&config.recording)?;
     let frames = if config.frames.is_empty() { recording.numbers().collect() } else { config.frames };
     let body = ReplayBody::with_playlist(recording, frames)?;
