@@ -1,0 +1,90 @@
+//! The network changes nothing: an episode in one process and the same episode through four real processes make the same
+//! decisions, bit for bit, and come to the same score.
+#![expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use homing_benchmark::{EpisodeRun, run_episode};
+use homing_core::{Action, NavigationState};
+use homing_perception::PerceptionConfig;
+use homing_planner::{Frontier, PlannerConfig};
+use homing_privileged::GroundTruth;
+use homing_protocol::navigate::{MissionReport, Outcome};
+use homing_sim::geodesic::GeodesicField;
+use homing_sim::{Arena, Episode, Finish, Score};
+use homing_tests::mission::{Mission, flat, photo};
+use homing_tests::processes::System;
+
+/// Takes about sixty steps, through discovery, approach and turning to the goal's heading.
+const SEED: u64 = 1001;
+const STEPS_MIN: usize = 40;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_episode_over_zenoh_is_the_episode_in_process() {
+    let (arena, episode) = flat(SEED);
+    let (here, states_here) = tokio::task::block_in_place(|| in_process(&arena, &episode));
+    let (report, states_there, truth) = over_zenoh(&arena, &episode).await;
+
+    assert!(states_here.len() >= STEPS_MIN, "{} steps show little", states_here.len());
+    for (a, b) in states_here.iter().zip(&states_there) {
+        assert_eq!(written(a), written(b));
+    }
+    assert_eq!(states_here.len(), states_there.len());
+    assert!(states_here.iter().any(|s| s.action == Action::TurnLeft));
+    assert!(states_here.iter().any(|s| s.goal.is_some()), "the goal was never seen: perception's part is not compared");
+    let there = score(&arena, &episode, &truth);
+    assert_eq!(format!("{:?}", here.score), format!("{there:?}"));
+    assert!(here.score.success, "{}: choose an episode that succeeds", here.reason);
+    assert_eq!((report.outcome, report.message), (Outcome::Arrived, here.reason));
+    assert_eq!(report.steps, states_there.last().unwrap().step);
+    assert!(truth.done);
+}
+
+fn in_process(arena: &Arc<Arena>, episode: &Episode) -> (EpisodeRun, Vec<NavigationState>) {
+    let mut states = Vec::new();
+    let run = run_episode(
+        arena,
+        episode,
+        PerceptionConfig::default(),
+        PlannerConfig::default(),
+        Box::new(Frontier::default()),
+        &mut |record| states.push(record.state.clone()),
+    );
+    (run.unwrap(), states)
+}
+
+async fn over_zenoh(arena: &Arena, episode: &Episode) -> (MissionReport, Vec<NavigationState>, GroundTruth) {
+    let system = System::new();
+    let file = system.file("episode.json", serde_json::to_string(episode).unwrap());
+    let mut body = system.body(&format!("episode = {file:?}"));
+    body.says("the body is ready");
+    let mut perception = system.node("homing-perception", "");
+    perception.says("perception is ready");
+    let mut planner = system.node("homing-planner", "");
+    planner.says("planner is ready");
+    let session = system.session();
+    let mission = Mission::begin(&session, &photo(arena, episode)).await;
+    let end = mission.end(Duration::from_secs(150)).await;
+    assert!(!planner.said().contains("WARN"), "something was lost or late: {}", planner.said());
+    session.close();
+    end
+}
+
+/// All digits, so that equality is equality of bits.
+fn written(state: &NavigationState) -> String {
+    format!("{state:?}")
+}
+
+/// The score as an operator with the truth makes it.
+fn score(arena: &Arena, episode: &Episode, truth: &GroundTruth) -> Score {
+    let field = GeodesicField::to(arena.space(), (episode.goal.x_m, episode.goal.y_m)).unwrap();
+    Score::strict(&Finish {
+        stopped: truth.done,
+        steps: truth.steps,
+        path_length_m: truth.path_length_m,
+        shortest_path_m: episode.shortest_path_m,
+        final_distance_m: field.distance_m(truth.pose.x_m, truth.pose.y_m),
+        final_heading_error_rad: truth.pose.yaw_rad - episode.goal.yaw_rad,
+    })
+}
