@@ -61,11 +61,6 @@ impl Fleet {
         })
     }
 
-    /// True while the process runs.
-    pub fn runs(&mut self, name: &str) -> bool {
-        self.members.iter_mut().any(|m| m.name == name && matches!(m.child.try_wait(), Ok(None)))
-    }
-
     /// Asks a process to leave, and waits; kills it when the time is over.
     pub fn stop(&mut self, name: &str, limit: Duration) {
         for member in self.members.iter_mut().filter(|m| m.name == name) {

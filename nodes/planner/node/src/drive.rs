@@ -42,7 +42,7 @@ struct Active {
     command: Option<Outstanding>,
     result: Option<MotionResult>,
     next_from: Stamp,
-    complete_since: Option<(Stamp, Instant)>,
+    waiting_since: Option<Instant>,
     path_length_m: f64,
 }
 
@@ -116,7 +116,8 @@ impl Driver {
     /// Tells the body to stand still.
     pub fn halt(&mut self) {
         if self.mission.is_some() {
-            let stamp = self.planner.state().stamp;
+            // Stamped with the newest reading of the robot's clock: a stop must not arrive expired.
+            let stamp = self.moments.clock();
             let command = self.command(stamp, Motion::Stop { done: false });
             if let Err(cause) = self.links.command.publish(&command.to_message()) {
                 tracing::error!(%cause, "the last stop was not sent; the body's own watchdog stops it");
@@ -147,42 +148,41 @@ impl Driver {
         Ok(())
     }
 
-    /// The newest moment, once everything that belongs to it is here or has been waited for long enough.
+    /// The newest moment that perception has answered; without an answer in time, the newest there is.
     fn complete_moment(&mut self, session: &Session) -> Option<(PlannerObservation, Perception)> {
         let active = self.mission.as_mut()?;
         if active.command.is_some() {
             return None;
         }
+        if let Some(observation) = self.moments.newest_answered(active.next_from) {
+            self.note(Answering::InTime);
+            return Some((observation, Perception::Present));
+        }
         let observation = self.moments.newest(active.next_from)?;
-        let stamp = observation.odometry.stamp;
-        let since = match active.complete_since {
-            Some((at, since)) if at == stamp => since,
-            _ => {
-                active.complete_since = Some((stamp, Instant::now()));
-                Instant::now()
-            }
-        };
-        let (answering, perception) = if self.moments.answered(stamp) {
-            (Answering::InTime, Perception::Present)
-        } else if !session.has_sender(&topics::GOAL_ESTIMATE) {
-            (Answering::Gone, Perception::Absent)
-        } else {
-            let wait = if self.perception == Answering::Late { LATE_ANSWER_MAX } else { self.config.pace.answer_max() };
-            if since.elapsed() < wait {
-                return None;
-            }
-            (Answering::Late, Perception::Absent)
-        };
+        let waiting_since = *active.waiting_since.get_or_insert_with(Instant::now);
+        if !session.has_sender(&topics::GOAL_ESTIMATE) {
+            self.note(Answering::Gone);
+            return Some((observation, Perception::Absent));
+        }
+        let wait = if self.perception == Answering::Late { LATE_ANSWER_MAX } else { self.config.pace.answer_max() };
+        if waiting_since.elapsed() < wait {
+            return None;
+        }
+        self.note(Answering::Late);
+        Some((observation, Perception::Absent))
+    }
+
+    fn note(&mut self, answering: Answering) {
         if answering != self.perception {
             tracing::warn!(now = ?answering, "perception's answers");
             self.perception = answering;
         }
-        Some((observation, perception))
     }
 
     fn step(&mut self, observation: PlannerObservation, perception: Perception) -> anyhow::Result<()> {
         let stamp = observation.odometry.stamp;
         let Some(active) = &mut self.mission else { return Ok(()) };
+        active.waiting_since = None;
         let motion = active.result.take().map(|r| r.outcome);
         active.path_length_m += motion.map_or(0.0, |m| m.moved.distance_to(0.0, 0.0));
         let event = StepEvent {
@@ -193,6 +193,7 @@ impl Driver {
             perception,
         };
         let action = self.planner.step(stamp, &event);
+        tracing::debug!(at_s = stamp.seconds(), ?action, reason = self.planner.state().reason, "step");
         self.show()?;
         self.carry_out(stamp, action)
     }
@@ -209,6 +210,7 @@ impl Driver {
         }
         let body = self.config.planner().body;
         let command = self.command(stamp, action.motion(body.forward_m, body.turn_rad));
+        tracing::debug!(sequence = command.sequence, motion = ?command.motion, "command");
         self.links.command.publish(&command.to_message())?;
         if let Some(active) = &mut self.mission {
             let now = Instant::now();
@@ -270,6 +272,12 @@ fn settle(mission: &mut Option<Active>, result: MotionResult) {
     let Some(active) = mission else { return };
     let answers = |o: &Outstanding| o.command.session == result.session && o.command.sequence == result.sequence;
     if active.command.as_ref().is_some_and(answers) {
+        tracing::debug!(
+            sequence = result.sequence,
+            at_s = result.outcome.stamp.seconds(),
+            blocked = result.outcome.blocked,
+            "result"
+        );
         active.command = None;
         active.next_from = result.outcome.stamp;
         active.result = Some(result);
@@ -289,7 +297,7 @@ fn begin(driver: &mut Driver, mission: Option<Mission>) {
                 command: None,
                 result: None,
                 next_from: Stamp(0),
-                complete_since: None,
+                waiting_since: None,
                 path_length_m: 0.0,
             });
         }

@@ -10,6 +10,8 @@ use homing_planner::PlannerObservation;
 
 /// Moments kept while their parts are still arriving.
 const WAITING_MAX: usize = 16;
+/// Odometry kept: five seconds at 50 Hz.
+const ODOMETRY_MAX: usize = 256;
 
 /// What has arrived and was not yet used.
 #[derive(Default)]
@@ -17,13 +19,15 @@ pub struct Moments {
     waiting: BTreeMap<Stamp, Parts>,
     mount: Option<Transform<Base, Camera>>,
     estimates: BTreeMap<Stamp, GoalEstimate>,
+    // More frequent than images: kept apart, so that it does not push them out.
+    odometry: BTreeMap<Stamp, Odometry>,
+    clock: Stamp,
 }
 
 #[derive(Default)]
 struct Parts {
     depth: Option<Arc<DepthImage>>,
     intrinsics: Option<Intrinsics>,
-    odometry: Option<Odometry>,
 }
 
 impl Moments {
@@ -36,7 +40,11 @@ impl Moments {
     }
 
     pub fn odometry(&mut self, odometry: Odometry) {
-        self.parts(odometry.stamp).odometry = Some(odometry);
+        self.clock = odometry.stamp;
+        self.odometry.insert(odometry.stamp, odometry);
+        while self.odometry.len() > ODOMETRY_MAX {
+            self.odometry.pop_first();
+        }
     }
 
     pub fn mount(&mut self, t_base_camera: Transform<Base, Camera>) {
@@ -55,22 +63,31 @@ impl Moments {
         }
     }
 
-    /// The newest complete moment at or after `from`.
-    pub fn newest(&self, from: Stamp) -> Option<PlannerObservation> {
-        let t_base_camera = self.mount?;
-        self.waiting.range(from..).rev().find_map(|(_, parts)| {
-            Some(PlannerObservation {
-                odometry: parts.odometry?,
-                depth: Arc::clone(parts.depth.as_ref()?),
-                intrinsics: parts.intrinsics?,
-                t_base_camera,
-            })
-        })
+    /// The robot's clock, as of its last odometry.
+    pub fn clock(&self) -> Stamp {
+        self.clock
     }
 
-    /// True if perception's answer to the moment at `stamp` is here.
-    pub fn answered(&self, stamp: Stamp) -> bool {
-        self.estimates.contains_key(&stamp)
+    /// The newest complete moment at or after `from`.
+    pub fn newest(&self, from: Stamp) -> Option<PlannerObservation> {
+        self.complete(from).next()
+    }
+
+    /// The newest complete moment at or after `from` that perception has answered.
+    pub fn newest_answered(&self, from: Stamp) -> Option<PlannerObservation> {
+        self.complete(from).find(|o| self.estimates.contains_key(&o.odometry.stamp))
+    }
+
+    /// Complete moments, newest first.
+    fn complete(&self, from: Stamp) -> impl Iterator<Item = PlannerObservation> + '_ {
+        self.waiting.range(from..).rev().filter_map(|(stamp, parts)| {
+            Some(PlannerObservation {
+                odometry: *self.odometry.get(stamp)?,
+                depth: Arc::clone(parts.depth.as_ref()?),
+                intrinsics: parts.intrinsics?,
+                t_base_camera: self.mount?,
+            })
+        })
     }
 
     /// Takes the newest answer up to `stamp`; forgets everything before the moment at `stamp`.
@@ -86,6 +103,7 @@ impl Moments {
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.estimates.clear();
+        self.odometry.clear();
     }
 
     fn parts(&mut self, stamp: Stamp) -> &mut Parts {
