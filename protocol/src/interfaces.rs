@@ -2,8 +2,8 @@
 
 #[expect(
     missing_docs,
-    clippy::all,
-    clippy::unwrap_used,
+    clippy::allow_attributes,
+    clippy::expect_used,
     reason = "generated from .msg files, which hold the documentation"
 )]
 mod generated {

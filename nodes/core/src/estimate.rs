@@ -27,6 +27,7 @@ pub struct GoalEstimate {
 
 /// The finding itself.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one exists per frame; a box would cost more than the bytes")]
 pub enum Sighting {
     /// The goal is not in this frame, as far as can be told.
     NotSeen {

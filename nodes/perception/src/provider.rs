@@ -62,6 +62,14 @@ pub fn load_runtime(library: &Path) -> Result<RuntimeReport, RuntimeError> {
     })
 }
 
+/// Version of the OpenCV library in use, "4.6.0".
+///
+/// # Errors
+/// OpenCV's own error when the library does not answer.
+pub fn opencv_version() -> Result<String, opencv::Error> {
+    opencv::core::get_version_string()
+}
+
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a failing test should say where")]
@@ -78,12 +86,4 @@ mod tests {
         std::fs::remove_file(&text).unwrap();
         assert!(matches!(unusable, RuntimeError::Unusable { .. }), "{unusable}");
     }
-}
-
-/// Version of the OpenCV library in use, "4.6.0".
-///
-/// # Errors
-/// OpenCV's own error when the library does not answer.
-pub fn opencv_version() -> Result<String, opencv::Error> {
-    opencv::core::get_version_string()
 }

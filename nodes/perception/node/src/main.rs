@@ -73,7 +73,7 @@ async fn run(config: Config) -> anyhow::Result<()> {
                 .and_then(|i| frame_answers(&mut answerer, assembler.add(i.stamp, Part::Intrinsics(i.intrinsics))?, i.stamp)),
             goal = goals.recv() => goal.map_err(anyhow::Error::from)
                 .and_then(|g| Ok(g.message.to_domain()?))
-                .and_then(|photo| Ok(tokio::task::block_in_place(|| answerer.show(photo))?)),
+                .and_then(|photo| tokio::task::block_in_place(|| answerer.show(photo))),
         };
         match answers {
             Ok(Some(estimate)) => estimates.publish(&estimate.to_message())?,

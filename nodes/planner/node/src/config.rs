@@ -137,16 +137,18 @@ impl PaceSettings {
 impl Config {
     /// As the library's configuration.
     pub fn planner(&self) -> PlannerConfig {
-        let mut config = PlannerConfig::default();
-        config.map_side_m = self.map.side_m;
-        config.resolution_m = self.map.resolution_m;
+        let mut config = PlannerConfig {
+            map_side_m: self.map.side_m,
+            resolution_m: self.map.resolution_m,
+            step_budget: self.mission.step_budget,
+            ..PlannerConfig::default()
+        };
         config.body.radius_m = self.body.radius_m;
         config.body.forward_m = self.body.forward_m;
         // An untouched default keeps its bits: degrees would move the last one.
         if self.body.turn_deg != config.body.turn_rad.to_degrees() {
             config.body.turn_rad = self.body.turn_deg.to_radians();
         }
-        config.step_budget = self.mission.step_budget;
         config
     }
 }
