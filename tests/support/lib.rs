@@ -1,5 +1,5 @@
 //! What the tests across crates share: where things are, and real processes on a network of their own.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "test support may fail by panicking")]
+#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "test support may fail by panicking")]
 
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
