@@ -1,12 +1,17 @@
-//! `sightings FIRST LAST [N]`: perception alone: N robots put near each goal and N elsewhere in the flat, what it says
-//! there, and how far off it is. One line for each: what is needed to choose gates.
+//! `sightings FIRST LAST [N] [SETTINGS]...`: perception alone: N robots put near each goal and N elsewhere in the flat, what
+//! it says there, and how far off it is. One line for each: what is needed to choose gates. Each SETTINGS is a list such as
+//! `n=8,ratio=0.9,share=0.05,patch=0.6,gate=0.008,tries=5`; all of them are tried on the same images and keypoints.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use homing_core::{GoalPhoto, PlanarPose, RgbdFrame, Sighting, Stamp, Transform, wrap_angle};
-use homing_perception::{GoalEstimator, PerceptionConfig};
+use homing_core::{
+    Base, Camera, FeatureExtractor, Features, GoalEstimate, GoalPhoto, PlanarPose, RgbImage, RgbdFrame, Sighting,
+    Stamp, Transform, wrap_angle,
+};
+use homing_perception::{GoalEstimator, MutualNearest, PerceptionConfig, PerceptionError, Sift};
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{self, EpisodeSpec, Viewpoint, in_sight, t_world_base};
+use homing_sim::scene::World;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
@@ -14,9 +19,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let numbers: Vec<u64> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let [first, last, rest @ ..] = numbers.as_slice() else { return Err("sightings FIRST LAST [N]".into()) };
     let n = rest.first().copied().unwrap_or(12) as usize;
-    println!("seed,kind,distance_m,yaw_deg,sight,verdict,n_inliers,n_matches,error_m,error_deg,z_m,tilt_deg,cover,zncc,colour,patch,n_patch");
+    let settings: Vec<(String, PerceptionConfig)> = std::env::args()
+        .skip(1)
+        .filter(|a| a.contains('='))
+        .map(|text| config(&text).map(|c| (text.replace(',', ";"), c)))
+        .collect::<Result<_, _>>()?;
+    let settings = if settings.is_empty() { vec![("default".to_owned(), usual())] } else { settings };
+    println!(
+        "config,seed,kind,distance_m,yaw_deg,sight,verdict,n_inliers,n_matches,error_m,error_deg,z_m,tilt_deg,cover,zncc,colour,patch,n_patch"
+    );
     (*first..=*last).into_par_iter().for_each(|seed| {
-        if let Err(cause) = flat(seed, n) {
+        if let Err(cause) = flat(seed, n, &settings) {
             eprintln!("{seed}: {cause}");
         }
     });
@@ -35,7 +48,7 @@ impl Dice {
     }
 }
 
-fn flat(seed: u64, n: usize) -> Result<(), Box<dyn std::error::Error>> {
+fn flat(seed: u64, n: usize, settings: &[(String, PerceptionConfig)]) -> Result<(), Box<dyn std::error::Error>> {
     let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
     let episode = episode::draw(&arena, seed, &EpisodeSpec::default())?;
     let camera = Viewpoint::default();
@@ -45,8 +58,14 @@ fn flat(seed: u64, n: usize) -> Result<(), Box<dyn std::error::Error>> {
         rgb: Arc::new(episode.camera.photo(&arena, episode.goal)?),
         intrinsics: episode.camera.intrinsics()?,
     };
-    let mut estimator = GoalEstimator::new(PerceptionConfig { threads: Some(1), ..PerceptionConfig::default() })?;
-    estimator.set_goal(photo.clone())?;
+    let memory = Arc::new(Mutex::new(Memory { of: 0, features: Features::default(), sift: Sift::new(usual().sift)? }));
+    let mut estimators = Vec::new();
+    for (name, config) in settings {
+        let matcher = MutualNearest { ratio_max: config.ratio_max };
+        let mut estimator = GoalEstimator::with_parts(*config, Remembering(memory.clone()), matcher)?;
+        estimator.set_goal(photo.clone())?;
+        estimators.push((name, estimator));
+    }
     let goal = PlanarPose::from(episode.goal);
     let mut dice = Dice(seed);
     let (mut near, mut far) = (0, 0);
@@ -60,42 +79,114 @@ fn flat(seed: u64, n: usize) -> Result<(), Box<dyn std::error::Error>> {
         let turn = wrap_angle(pose.yaw_rad - goal.yaw_rad);
         let sight = in_sight(&arena, (x_m, y_m), (goal.x_m, goal.y_m));
         let is_near = distance < 5.0 && sight && turn.abs() < 1.2;
-        if is_near && near < n { near += 1 } else if !is_near && far < n { far += 1 } else { continue }
+        if is_near && near < n {
+            near += 1
+        } else if !is_near && far < n {
+            far += 1
+        } else {
+            continue;
+        }
         let t_world_camera = t_world_base(&arena, pose) * camera.t_base_camera();
         let (rgb, depth) = arena.view(&intrinsics, &t_world_camera);
         let frame = RgbdFrame::new(Stamp(tries * 500_000_000), Arc::new(rgb), Arc::new(depth), intrinsics)?;
-        let estimate = estimator.estimate(&frame)?;
         let kind = if is_near { "near" } else { "far" };
-        let head = format!("{seed},{kind},{distance:.2},{:.0},{}", turn.to_degrees(), u8::from(sight));
-        match &estimate.sighting {
-            Sighting::NotSeen { reason } => println!("{head},{reason:?},0,{},,,,,,,,,", estimate.n_matches),
-            Sighting::Bearing { n_inliers, .. } => println!("{head},bearing,{n_inliers},{},,,,,,,,,", estimate.n_matches),
-            Sighting::Pose { t_camera_goal, n_inliers, .. } => {
-                let t_world_goal = t_world_camera.isometry() * t_camera_goal.isometry();
-                let said: Transform<homing_sim::scene::World, homing_core::Base> =
-                    Transform::new(t_world_goal * camera.t_base_camera().inverse().isometry());
-                let planar = said.planar();
-                let error_m = planar.distance_to(goal.x_m, goal.y_m);
-                let error = wrap_angle(planar.yaw_rad - goal.yaw_rad).to_degrees();
-                let up = said.rotation() * nalgebra::Vector3::z();
-                let tilt = up.z.clamp(-1.0, 1.0).acos().to_degrees();
-                let right = error_m < 1.0 && error.abs() < 30.0;
-                let s = agreement(&frame, &photo, t_camera_goal);
-                println!(
-                    "{head},{},{n_inliers},{},{error_m:.2},{error:.1},{:.2},{tilt:.1},{:.3},{:.3},{:.3},{:.3},{}",
-                    if right { "right" } else { "wrong" },
-                    estimate.n_matches,
-                    said.translation().z,
-                    s.cover,
-                    s.zncc,
-                    s.colour,
-                    s.patch,
-                    s.n_patch
-                );
-            }
+        for (name, estimator) in &mut estimators {
+            let estimate = estimator.estimate(&frame)?;
+            let head = format!("{name},{seed},{kind},{distance:.2},{:.0},{}", turn.to_degrees(), u8::from(sight));
+            println!("{head},{}", line(&estimate, &t_world_camera, &camera, &goal, &frame, &photo));
         }
     }
     Ok(())
+}
+
+fn line(
+    estimate: &GoalEstimate,
+    t_world_camera: &Transform<World, Camera>,
+    camera: &Viewpoint,
+    goal: &PlanarPose,
+    frame: &RgbdFrame,
+    photo: &GoalPhoto,
+) -> String {
+    let (t_camera_goal, n_inliers) = match &estimate.sighting {
+        Sighting::NotSeen { reason } => return format!("{reason:?},0,{},,,,,,,,,", estimate.n_matches),
+        Sighting::Bearing { n_inliers, .. } => return format!("bearing,{n_inliers},{},,,,,,,,,", estimate.n_matches),
+        Sighting::Pose { t_camera_goal, n_inliers, .. } => (t_camera_goal, n_inliers),
+    };
+    let t_world_goal = t_world_camera.isometry() * t_camera_goal.isometry();
+    let said: Transform<World, Base> = Transform::new(t_world_goal * camera.t_base_camera().inverse().isometry());
+    let planar = said.planar();
+    let error_m = planar.distance_to(goal.x_m, goal.y_m);
+    let error = wrap_angle(planar.yaw_rad - goal.yaw_rad).to_degrees();
+    let tilt = (said.rotation() * nalgebra::Vector3::z()).z.clamp(-1.0, 1.0).acos().to_degrees();
+    let right = error_m < 1.0 && error.abs() < 30.0;
+    let s = agreement(frame, photo, t_camera_goal);
+    format!(
+        "{},{n_inliers},{},{error_m:.2},{error:.1},{:.2},{tilt:.1},{:.3},{:.3},{:.3},{:.3},{}",
+        if right { "right" } else { "wrong" },
+        estimate.n_matches,
+        said.translation().z,
+        s.cover,
+        s.zncc,
+        s.colour,
+        s.patch,
+        s.n_patch
+    )
+}
+
+fn usual() -> PerceptionConfig {
+    let mut config = PerceptionConfig { threads: Some(1), ..PerceptionConfig::default() };
+    if let Ok(text) = std::env::var("SIFT")
+        && let Some((n, contrast)) = text.split_once(',')
+    {
+        config.sift.keypoints_max = n.parse().unwrap_or(config.sift.keypoints_max);
+        config.sift.contrast_min = contrast.parse().unwrap_or(config.sift.contrast_min);
+    }
+    config
+}
+
+fn config(text: &str) -> Result<PerceptionConfig, Box<dyn std::error::Error>> {
+    let mut config = usual();
+    for knob in text.split(',') {
+        let (name, value) = knob.split_once('=').ok_or("NAME=VALUE")?;
+        match name {
+            "n" => config.gates.n_inliers_min = value.parse()?,
+            "ratio" => config.ratio_max = value.parse()?,
+            "share" => config.gates.inlier_share_min = value.parse()?,
+            "patch" => config.gates.patch_share_min = value.parse()?,
+            "gate" => config.gates.error_rad_max = value.parse()?,
+            "tries" => config.hypotheses_max = value.parse()?,
+            _ => return Err(format!("no knob {name}").into()),
+        }
+    }
+    Ok(config)
+}
+
+/// The keypoints of the last image, so that several settings cost one extraction.
+struct Memory {
+    of: u64,
+    features: Features,
+    sift: Sift,
+}
+
+struct Remembering(Arc<Mutex<Memory>>);
+
+impl FeatureExtractor for Remembering {
+    type Error = PerceptionError;
+
+    fn name(&self) -> &str {
+        "sift"
+    }
+
+    fn extract(&mut self, image: &RgbImage) -> Result<Features, PerceptionError> {
+        let mut memory = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mix = |h: u64, byte: &u8| (h ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+        let key = image.data().iter().step_by(7).fold(0xcbf2_9ce4_8422_2325, mix);
+        if memory.of != key {
+            memory.features = memory.sift.extract(image)?;
+            memory.of = key;
+        }
+        Ok(memory.features.clone())
+    }
 }
 
 struct Agreement {
@@ -121,7 +212,8 @@ fn agreement(
     for v in (0..frame.rgb.height()).step_by(2) {
         for u in (0..frame.rgb.width()).step_by(2) {
             let Some(d) = frame.depth.at(u, v) else { continue };
-            let p: Point3<f64> = t_goal_camera.apply(&frame.intrinsics.unproject(f64::from(u), f64::from(v), f64::from(d)));
+            let p: Point3<f64> =
+                t_goal_camera.apply(&frame.intrinsics.unproject(f64::from(u), f64::from(v), f64::from(d)));
             let Some(px) = photo.intrinsics.project(&p) else { continue };
             if px.x < 0.0 || px.y < 0.0 {
                 continue;
@@ -171,10 +263,8 @@ fn agreement(
     let luma = |p: [f64; 3]| 0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2];
     let lumas: Vec<(f64, f64)> = known.iter().map(|(a, b)| (luma(*a), luma(*b))).collect();
     let zncc = correlation(&lumas).map_or(0.0, |c| c.0);
-    let colour = known
-        .iter()
-        .filter(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max) < 25.0)
-        .count() as f64
+    let colour = known.iter().filter(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max) < 25.0).count()
+        as f64
         / known.len().max(1) as f64;
     let mut patches = Vec::new();
     const SIDE: usize = 5;
