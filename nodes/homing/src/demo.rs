@@ -32,7 +32,7 @@ use crate::{Ended, photo};
 #[derive(Args)]
 pub struct DemoArgs {
     /// Seed of the flat, the start and the goal.
-    #[arg(long, default_value_t = 7)]
+    #[arg(long, default_value_t = 12)]
     seed: u64,
     /// A glTF 2.0 scene (.glb) instead of a generated flat.
     #[arg(long, value_name = "FILE.glb")]
