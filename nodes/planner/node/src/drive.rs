@@ -90,7 +90,10 @@ impl Driver {
                 .and_then(|m| { if let Some(mount) = to_camera_mount(&m.message)? { self.moments.mount(mount); } Ok(()) }),
             estimate = links.estimates.recv() => estimate.map_err(Into::into).and_then(|e| {
                 let goal_id = self.mission.as_ref().map_or(0, |m| m.photo.id);
-                self.moments.estimate(e.message.to_domain()?, goal_id);
+                // Who answers at all is waited for again: in lockstep it would else stay a frame behind for good.
+                if self.moments.estimate(e.message.to_domain()?, goal_id) && self.perception == Answering::Late {
+                    note(&mut self.perception, Answering::InTime);
+                }
                 Ok(())
             }),
             result = links.results.recv() => result.map_err(Into::into)
@@ -155,28 +158,21 @@ impl Driver {
             return None;
         }
         if let Some(observation) = self.moments.newest_answered(active.next_from) {
-            self.note(Answering::InTime);
+            note(&mut self.perception, Answering::InTime);
             return Some((observation, Perception::Present));
         }
         let observation = self.moments.newest(active.next_from)?;
         let waiting_since = *active.waiting_since.get_or_insert_with(Instant::now);
         if !session.has_sender(&topics::GOAL_ESTIMATE) {
-            self.note(Answering::Gone);
+            note(&mut self.perception, Answering::Gone);
             return Some((observation, Perception::Absent));
         }
         let wait = if self.perception == Answering::Late { LATE_ANSWER_MAX } else { self.config.pace.answer_max() };
         if waiting_since.elapsed() < wait {
             return None;
         }
-        self.note(Answering::Late);
+        note(&mut self.perception, Answering::Late);
         Some((observation, Perception::Absent))
-    }
-
-    fn note(&mut self, answering: Answering) {
-        if answering != self.perception {
-            tracing::warn!(now = ?answering, "perception's answers");
-            self.perception = answering;
-        }
     }
 
     fn step(&mut self, observation: PlannerObservation, perception: Perception) -> anyhow::Result<()> {
@@ -257,6 +253,13 @@ impl Driver {
             path_length_m: active.path_length_m,
             message,
         });
+    }
+}
+
+fn note(perception: &mut Answering, now: Answering) {
+    if *perception != now {
+        tracing::warn!(?now, "perception's answers");
+        *perception = now;
     }
 }
 

@@ -51,16 +51,18 @@ impl Moments {
         self.mount = Some(t_base_camera);
     }
 
-    /// Keeps an estimate that speaks of `goal_id`. "No goal yet" is no answer: the photo is still on its way.
-    pub fn estimate(&mut self, estimate: GoalEstimate, goal_id: u64) {
+    /// Keeps an estimate that speaks of `goal_id`, and says whether it does. "No goal yet" is no answer: the photo is still
+    /// on its way.
+    pub fn estimate(&mut self, estimate: GoalEstimate, goal_id: u64) -> bool {
         let no_goal = matches!(estimate.sighting, Sighting::NotSeen { reason: UnseenReason::NoGoal });
         if no_goal || estimate.goal_id != goal_id {
-            return;
+            return false;
         }
         self.estimates.insert(estimate.stamp, estimate);
         while self.estimates.len() > WAITING_MAX {
             self.estimates.pop_first();
         }
+        true
     }
 
     /// The robot's clock, as of its last odometry.
