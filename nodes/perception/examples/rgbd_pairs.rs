@@ -46,6 +46,7 @@ fn main() -> Fallible<()> {
     set("--contrast", &mut config.sift.contrast_min)?;
     set("--gate", &mut config.gates.error_rad_max)?;
     set("--share", &mut config.gates.inlier_share_min)?;
+    set("--patches", &mut config.gates.patch_share_min)?;
     set("--sd-px", &mut config.keypoint_sd_px)?;
     (config.sift.keypoints_max, config.ratio_max, config.gates.n_inliers_min) =
         (n as usize, ratio as f32, n_min as usize);
