@@ -85,12 +85,27 @@ fn dependencies_point_the_allowed_way() {
 
 #[test]
 fn the_page_shows_the_same_table() {
-    let page = repository().join("ARCHITECTURE.md");
-    let Ok(page) = fs::read_to_string(&page) else {
-        return println!("SKIPPED: {} is not there", page.display());
-    };
+    let page = page();
     let block = fenced(&page, "dependencies").unwrap_or_else(|| panic!("ARCHITECTURE.md has no block ```dependencies"));
     assert_eq!(edges(&block), edges(ALLOWED), "ARCHITECTURE.md and the tested table differ");
+}
+
+#[test]
+fn what_the_page_names_is_there() {
+    let page = page();
+    // Between backquotes, what begins with a folder of the top level is a path.
+    let paths = page
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .flat_map(str::split_whitespace)
+        .filter(|path| path.split_once('/').is_some_and(|(top, _)| TOP_LEVEL.contains(&top) || top == ".cargo"));
+    let mut n_paths = 0;
+    for path in paths {
+        n_paths += 1;
+        assert!(repository().join(path).exists(), "ARCHITECTURE.md names {path}, which does not exist");
+    }
+    assert!(n_paths > 10, "only {n_paths} paths were found");
 }
 
 #[test]
@@ -142,8 +157,11 @@ fn every_member_is_held_to_the_workspace_lints() {
 }
 
 #[test]
-fn the_top_of_the_tree_holds_nothing_else() {
+fn the_top_of_the_tree_holds_this_and_nothing_else() {
     let allowed = BTreeSet::from(TOP_LEVEL);
+    for name in &allowed {
+        assert!(repository().join(name).exists(), "{name} is missing");
+    }
     for entry in fs::read_dir(repository()).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         // What a build and a demo leave behind is ignored by git.
@@ -212,6 +230,10 @@ fn reachable(metadata: &Metadata, from: &str) -> BTreeSet<String> {
         }
     }
     seen.into_iter().map(|id| metadata[id].name.to_string()).collect()
+}
+
+fn page() -> String {
+    fs::read_to_string(repository().join("ARCHITECTURE.md")).unwrap()
 }
 
 fn fenced(page: &str, mark: &str) -> Option<String> {
