@@ -2,11 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use homing_core::{DepthImage, FrameSizeError, Intrinsics, RgbImage, RgbdFrame, Stamp};
 
 /// Moments kept while their parts are still arriving.
 const WAITING_MAX: usize = 8;
+
+/// A stamp this much before the last one means that the robot's clock began anew: a restart or a reset.
+const CLOCK_RESTART: Duration = Duration::from_millis(500);
 
 /// Puts the parts of a frame together, in whatever order they arrive.
 #[derive(Default)]
@@ -39,8 +43,12 @@ impl FrameAssembler {
     /// # Errors
     /// [`FrameSizeError`] when the parts do not have one size.
     pub fn add(&mut self, stamp: Stamp, part: Part) -> Result<Option<RgbdFrame>, FrameSizeError> {
-        if self.newest_complete.is_some_and(|newest| stamp <= newest) {
-            return Ok(None);
+        if let Some(newest) = self.newest_complete {
+            if newest.since(stamp) > CLOCK_RESTART {
+                self.reset();
+            } else if stamp <= newest {
+                return Ok(None);
+            }
         }
         let parts = self.waiting.entry(stamp).or_default();
         match part {
@@ -71,7 +79,7 @@ impl FrameAssembler {
     }
 
     /// Forget everything: the robot's clock began anew.
-    pub fn reset(&mut self) {
+    fn reset(&mut self) {
         *self = Self { dropped: self.dropped, ..Self::default() };
     }
 }

@@ -4,7 +4,7 @@
 //! takes the place of the one under way: the newest wish of the operator counts.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hiroz::action::client::{GoalHandle, ZActionClient, goal_state::Active};
 use hiroz::action::messages::{
@@ -26,6 +26,11 @@ use crate::session::Session;
 
 /// Name below the robot's namespace.
 pub const ACTION: &str = "navigate_to_image";
+
+/// A question that fails sooner than this was not waited for: nobody is there to answer.
+const QUICK: Duration = Duration::from_millis(500);
+/// After so many of those in a row the planner is gone.
+const REFUSALS_MAX: u32 = 6;
 
 /// ROS 2 goal status codes (action_msgs/msg/GoalStatus).
 const SUCCEEDED: i8 = 4;
@@ -325,11 +330,12 @@ impl Shared {
 
 /// The operator's end.
 pub struct NavigateClient {
-    client: ZActionClient<NavigateToImage>,
+    client: Arc<ZActionClient<NavigateToImage>>,
 }
 
 /// A mission that was accepted.
 pub struct NavigateGoal {
+    client: Arc<ZActionClient<NavigateToImage>>,
     handle: GoalHandle<NavigateToImage, Active>,
     feedback: Option<mpsc::UnboundedReceiver<NavigateToImageFeedback>>,
 }
@@ -344,7 +350,7 @@ impl NavigateClient {
         if !client.wait_for_server(timeout).await {
             return Err(NavigateError::NoPlanner(timeout));
         }
-        Ok(Self { client })
+        Ok(Self { client: Arc::new(client) })
     }
 
     /// Sends the photo.
@@ -358,7 +364,7 @@ impl NavigateClient {
             NavigateError::Refused
         })?;
         let feedback = handle.feedback();
-        Ok(NavigateGoal { handle, feedback })
+        Ok(NavigateGoal { client: Arc::clone(&self.client), handle, feedback })
     }
 }
 
@@ -380,24 +386,48 @@ impl NavigateGoal {
     /// # Errors
     /// [`NavigateError::Transport`] when the planner does not answer.
     pub async fn cancel(&self) -> Result<(), NavigateError> {
-        self.handle.cancel().await.map(|_| ()).map_err(transport)
+        match self.handle.cancel().await.map_err(transport)?.return_code {
+            0 => Ok(()),
+            code => Err(transport(format!("the planner does not drive to this photo (code {code})"))),
+        }
     }
 
-    /// Waits for the end.
+    /// Waits for the end; can be awaited beside [`NavigateGoal::progress`].
     ///
     /// # Errors
     /// [`NavigateError::Transport`] when the planner is gone or the time is over.
-    pub async fn result(self, timeout: Duration) -> Result<MissionReport, NavigateError> {
-        let result = self.handle.result_with_timeout(timeout).await.map_err(transport)?;
-        Ok(MissionReport {
-            outcome: match result.outcome {
-                0 => Outcome::Arrived,
-                2 => Outcome::Cancelled,
-                _ => Outcome::Failed,
-            },
-            steps: result.steps,
-            path_length_m: result.path_length_m,
-            message: result.message,
-        })
+    pub fn result(&self, timeout: Duration) -> impl Future<Output = Result<MissionReport, NavigateError>> + use<> {
+        let (client, id) = (Arc::clone(&self.client), self.handle.id());
+        async move {
+            let asked = Instant::now();
+            let mut refusals = 0;
+            // A question lives for seconds, a mission for minutes: it is asked again until it is answered.
+            loop {
+                let began = Instant::now();
+                match client.get_result(id).await {
+                    Ok(result) => return Ok(report(&result)),
+                    Err(cause) => {
+                        refusals = if began.elapsed() < QUICK { refusals + 1 } else { 0 };
+                        if refusals >= REFUSALS_MAX || asked.elapsed() > timeout {
+                            return Err(transport(format!("the planner gives no result: {cause}")));
+                        }
+                    }
+                }
+                tokio::time::sleep(QUICK / 2).await;
+            }
+        }
+    }
+}
+
+fn report(result: &NavigateToImageResult) -> MissionReport {
+    MissionReport {
+        outcome: match result.outcome {
+            0 => Outcome::Arrived,
+            2 => Outcome::Cancelled,
+            _ => Outcome::Failed,
+        },
+        steps: result.steps,
+        path_length_m: result.path_length_m,
+        message: result.message.clone(),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Duration;
 
 use serde::Deserialize;
@@ -43,6 +44,30 @@ pub fn read_config<T: DeserializeOwned>(path: &Path) -> Result<T, ConfigFileErro
     let text =
         std::fs::read_to_string(path).map_err(|source| ConfigFileError::Read { path: path.to_owned(), source })?;
     toml::from_str(&text).map_err(|cause| ConfigFileError::Parse { path: path.to_owned(), cause })
+}
+
+/// The whole of a process: its log, its configuration, its body, and the exit code for how that ended.
+pub fn run<C, E>(config: &Path, body: impl FnOnce(C) -> Result<(), E>) -> ExitCode
+where
+    C: DeserializeOwned + std::fmt::Debug,
+    E: std::fmt::Display,
+{
+    start_log();
+    let config: C = match read_config(config) {
+        Ok(config) => config,
+        Err(cause) => {
+            tracing::error!("{cause}");
+            return ExitCode::from(EXIT_CONFIG);
+        }
+    };
+    tracing::info!(?config, "effective configuration");
+    match body(config) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(cause) => {
+            tracing::error!("{cause:#}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
 /// The `[session]` table of every process.

@@ -89,7 +89,7 @@ pub const MOTION_COMMAND: Topic<MotionCommand> =
     Topic::new("motion_command", "planner", Qos::Command, "every step, again until answered", 4 * KB);
 /// The photo to drive to.
 pub const GOAL_IMAGE: Topic<GoalPhoto> =
-    Topic::new("goal_image", "planner", Qos::State, "1 Hz while a goal is set", 16 * MB);
+    Topic::new("goal_image", "planner", Qos::Frame, "1 Hz while a goal is set", 16 * MB);
 /// What the planner does and why.
 pub const NAVIGATION_STATE: Topic<NavigationState> =
     Topic::new("navigation_state", "planner", Qos::Display, "every step", MB);

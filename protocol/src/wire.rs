@@ -55,7 +55,21 @@ pub(crate) fn decode<M: Message>(payload: &ZBytes) -> Result<M, String> {
     decoded
 }
 
+/// Least bytes of a transform in a TFMessage: two headers' worth of lengths, seven doubles.
+const TRANSFORM_BYTES_MIN: usize = 76;
+
+/// The decoder makes room for as many transforms as the count claims before it reads one: a count that cannot be is
+/// refused here. No other message of ours holds a sequence of messages.
+fn check_count<M: Message, B: byteorder::ByteOrder>(body: &[u8]) -> Result<(), String> {
+    let Some(count) = body.first_chunk::<4>().map(|c| B::read_u32(c) as usize) else { return Ok(()) };
+    if M::type_name().starts_with("tf2_msgs") && count.saturating_mul(TRANSFORM_BYTES_MIN) > body.len() {
+        return Err(format!("{count} transforms are claimed in {} bytes", body.len()));
+    }
+    Ok(())
+}
+
 fn decode_body<M: Message, B: byteorder::ByteOrder>(body: &[u8]) -> Result<M, String> {
+    check_count::<M, B>(body)?;
     let mut reader = CdrReader::<B>::new(body);
     let message = M::cdr_deserialize(&mut reader).map_err(|e| e.to_string())?;
     // Encoders may pad to a multiple of four or eight.

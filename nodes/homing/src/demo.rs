@@ -112,12 +112,10 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     bar.finish_and_clear();
     let report = match watched? {
         Watched::Ended(report) => report,
-        Watched::Interrupted => {
-            eprintln!(
-                "interrupted: the robot stands; what was recorded is in {}",
-                crate::run_folder::shown(&folder.file(""))
-            );
-            leave(&mut fleet);
+        Watched::Interrupted | Watched::Unconfirmed => {
+            tokio::task::block_in_place(|| leave(&mut fleet));
+            let kept = crate::run_folder::shown(&folder.file(""));
+            eprintln!("interrupted: the robot stands; what was recorded is in {kept}");
             return Ok(Ended::Interrupted);
         }
     };
@@ -296,7 +294,7 @@ fn still_possible(fleet: &mut Fleet, bar: &ProgressBar) -> anyhow::Result<()> {
     }
 }
 
-/// Commanders first, so that the robot stands; the monitor after the body, so that it records the end.
+/// Commanders first, so that the robot stands; the body last, because it is the router of the others.
 fn leave(fleet: &mut Fleet) {
     fleet.stop("planner", Duration::from_secs(3));
     fleet.stop("perception", Duration::from_secs(3));

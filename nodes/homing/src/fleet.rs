@@ -1,6 +1,7 @@
 //! Starts the processes of a system on this machine, watches them, and stops them in order.
 
 use std::fs::File;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -44,6 +45,8 @@ impl Fleet {
             .arg("--config")
             .arg(config)
             .stdin(Stdio::null())
+            // Ctrl-C in a terminal is for this program, which stops the others in order.
+            .process_group(0)
             .stdout(sink.try_clone()?)
             .stderr(sink)
             .spawn()
@@ -71,7 +74,7 @@ impl Fleet {
 }
 
 impl Drop for Fleet {
-    /// Whatever happens, no process is left behind: commanders first, the body last.
+    /// However this program ends on its own, no process is left behind: commanders first, the body last.
     fn drop(&mut self) {
         for member in self.members.iter().rev() {
             signal(&member.child, Signal::SIGTERM);

@@ -49,6 +49,10 @@ pub async fn run(args: GotoArgs) -> anyhow::Result<Ended> {
             eprintln!("interrupted: the robot was told to stop");
             return Ok(Ended::Interrupted);
         }
+        Watched::Unconfirmed => {
+            eprintln!("interrupted: the planner did not confirm, THE ROBOT MAY STILL BE DRIVING");
+            return Ok(Ended::Interrupted);
+        }
     };
     let success = report.outcome == Outcome::Arrived;
     if args.json {

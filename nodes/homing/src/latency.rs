@@ -65,7 +65,7 @@ impl Stopwatch {
             if no_goal {
                 continue;
             }
-            let whole = (received.arrived_unix_ns - sent) as f64 * 1e-6;
+            let whole = received.arrived_unix_ns.saturating_sub(sent) as f64 * 1e-6;
             let t = &estimate.times;
             let stages = [t.extract, t.matching, t.pose].map(|d| d.as_secs_f64() * 1e3);
             self.rows.push([whole, stages[0], stages[1], stages[2], whole - stages.iter().sum::<f64>()]);

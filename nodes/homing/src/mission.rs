@@ -5,7 +5,7 @@ use std::time::Duration;
 use homing_core::Mode;
 use homing_protocol::Session;
 use homing_protocol::convert::EncodedPhoto;
-use homing_protocol::navigate::{MissionReport, NavigateClient, NavigateError, Progress};
+use homing_protocol::navigate::{MissionReport, NavigateClient, Progress};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Longest mission, wall clock.
@@ -15,8 +15,10 @@ const MISSION_MAX: Duration = Duration::from_secs(3600);
 pub enum Watched {
     /// The planner's report.
     Ended(MissionReport),
-    /// Ctrl-C: the mission was cancelled and the robot stands.
+    /// Ctrl-C: the mission was cancelled, and the robot told to stand.
     Interrupted,
+    /// Ctrl-C, but the planner did not confirm: the robot may still be driving.
+    Unconfirmed,
 }
 
 /// A bar for people; nothing on a pipe.
@@ -35,37 +37,37 @@ pub async fn drive(
 ) -> anyhow::Result<Watched> {
     let client = NavigateClient::connect(session, Duration::from_secs(20)).await?;
     let mut goal = client.send(photo).await?;
-    let interrupt = tokio::signal::ctrl_c();
+    let interrupt = homing_protocol::process::termination();
     tokio::pin!(interrupt);
+    let end = goal.result(MISSION_MAX);
+    tokio::pin!(end);
     loop {
         tokio::select! {
-            _ = &mut interrupt => {
+            report = &mut end => return Ok(Watched::Ended(report?)),
+            () = &mut interrupt => {
                 bar.set_message("stopping the robot");
-                // The planner stops the body first, then answers.
-                let cancelled = tokio::time::timeout(Duration::from_secs(3), goal.cancel()).await;
-                if !matches!(cancelled, Ok(Ok(()))) {
-                    tracing::warn!("the planner did not confirm; the body stops by itself when commands cease");
+                let asked = tokio::time::timeout(Duration::from_secs(3), goal.cancel()).await;
+                if !matches!(asked, Ok(Ok(()))) {
+                    return Ok(Watched::Unconfirmed);
                 }
-                return Ok(Watched::Interrupted);
+                // Cancelled means that the planner has told the body to stand.
+                return Ok(match tokio::time::timeout(Duration::from_secs(3), &mut end).await {
+                    Ok(Ok(_)) => Watched::Interrupted,
+                    _ => Watched::Unconfirmed,
+                });
             }
             news = goal.progress() => match news {
                 Some(progress) => {
                     bar.set_position(progress.step);
                     bar.set_message(words(&progress));
-                    if matches!(progress.mode, Mode::Arrived | Mode::Failed) {
-                        break;
-                    }
                 }
-                None => break,
+                // No more news; the result is still to come.
+                None => tokio::time::sleep(Duration::from_millis(200)).await,
             },
             () = tokio::time::sleep(Duration::from_millis(200)) => {}
         }
         each()?;
     }
-    let report = tokio::time::timeout(MISSION_MAX, goal.result(MISSION_MAX))
-        .await
-        .map_err(|_| NavigateError::Transport("no result".to_owned()))??;
-    Ok(Watched::Ended(report))
 }
 
 fn words(progress: &Progress) -> String {

@@ -92,7 +92,8 @@ pub async fn run(args: ReplayArgs) -> anyhow::Result<Ended> {
     let folder = RunFolder::create(&args.out, "replay")?;
     let mut tables = Vec::new();
     for (name, pairs) in plans {
-        tables.push(play(&args, &recording, &folder, name, &pairs).await?);
+        let own = folder.sub(&name.replace(' ', "-"))?;
+        tables.push(play(&args, &recording, &own, name, &pairs).await?);
     }
     let result = folder.write_json("result.json", &tables)?;
     if args.json {

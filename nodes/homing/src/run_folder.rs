@@ -31,6 +31,13 @@ impl RunFolder {
         anyhow::bail!("no free folder for the run below {}", base.display())
     }
 
+    /// A folder in it.
+    pub fn sub(&self, name: &str) -> anyhow::Result<Self> {
+        let path = self.path.join(name);
+        fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        Ok(Self { path })
+    }
+
     /// A file in it.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)

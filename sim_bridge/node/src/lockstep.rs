@@ -38,8 +38,10 @@ pub async fn run(session: &Session, mut world: World) -> anyhow::Result<()> {
                 () = &mut stop => return Ok(()),
                 (question, answer) = resets.next() => {
                     let outcome = world.reset_to(&question.episode_json);
-                    gate = CommandGate::new(GateConfig::new(limits));
-                    last = None;
+                    if outcome.is_ok() {
+                        gate = CommandGate::new(GateConfig::new(limits));
+                        last = None;
+                    }
                     let message = outcome.as_ref().err().map(|e| format!("{e:#}")).unwrap_or_default();
                     answer.give(&ResetEpisodeResponse { accepted: outcome.is_ok(), message }).await;
                     break;

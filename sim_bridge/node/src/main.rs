@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use homing_protocol::Session;
-use homing_protocol::process::{self, EXIT_CONFIG};
+use homing_protocol::process;
 
 use crate::config::{Config, Pace};
 use crate::world::World;
@@ -27,26 +27,11 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    process::start_log();
-    let config: Config = match process::read_config(&Args::parse().config) {
-        Ok(config) => config,
-        Err(cause) => {
-            tracing::error!("{cause}");
-            return ExitCode::from(EXIT_CONFIG);
-        }
-    };
-    match run(config) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(cause) => {
-            tracing::error!("{cause:#}");
-            ExitCode::FAILURE
-        }
-    }
+    process::run(&Args::parse().config, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    tracing::info!(?config, "effective configuration");
     // The port first: a taken one is known at once, before a scene is built.
     let session = Session::open(&config.session.body())?;
     let world = tokio::task::block_in_place(|| World::open(&config))?;

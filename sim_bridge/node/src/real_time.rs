@@ -34,9 +34,9 @@ pub async fn run(session: &Session, world: World, frame_period: Duration) -> any
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
     let mut due = Due { frame: Instant::now(), scan: Instant::now(), lease: Instant::now() };
-    loop {
+    let ended = loop {
         tokio::select! {
-            () = &mut stop => break,
+            () = &mut stop => break Ok(()),
             (question, answer) = resets.next() => {
                 let outcome = body.reset(&question.episode_json);
                 let message = outcome.as_ref().err().map(|e| format!("{e:#}")).unwrap_or_default();
@@ -50,10 +50,16 @@ pub async fn run(session: &Session, world: World, frame_period: Duration) -> any
                 Ok((linear_m_s, angular_rad_s)) => body.teleop(linear_m_s, angular_rad_s),
                 Err(cause) => tracing::warn!("ignored: {cause:#}"),
             },
-            _ = tick.tick() => tokio::task::block_in_place(|| body.tick(&mut due, frame_period))?,
+            _ = tick.tick() => {
+                body.release_if_gone(session);
+                if let Err(cause) = tokio::task::block_in_place(|| body.tick(&mut due, frame_period)) {
+                    break Err(cause);
+                }
+            }
         }
-    }
-    body.stand()
+    };
+    // However it ended, the robot stands.
+    body.stand().and(ended)
 }
 
 struct Due {
@@ -113,6 +119,15 @@ impl Body {
         if why != self.last_refusal {
             tracing::warn!(why, "a command");
             self.last_refusal = why;
+        }
+    }
+
+    /// A commander that left the network has given up its lease, and its motion ends.
+    fn release_if_gone(&mut self, session: &Session) {
+        if let Some(lease) = self.supervisor.lease()
+            && !session.has_sender(&topics::MOTION_COMMAND)
+        {
+            self.supervisor.release(self.world.simulator.now(), lease.session);
         }
     }
 

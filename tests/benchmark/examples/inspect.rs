@@ -2,7 +2,8 @@
 //!
 //! Plan: what is known white, obstacles black, never seen grey (the planner's map over the true floor plan), the way in
 //! blue while exploring and orange while driving to the goal, the true goal a green arrow, right sightings green dots, wrong
-//! ones red. `goal.png` is the photo. With `wrong`, the image and the matched points of every wrong sighting are drawn too.
+//! ones red. `goal.png` is the photo. With `wrong`, the image and the matched points of every wrong sighting are drawn too;
+//! with `blind` perception finds nothing, to watch exploration alone.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use std::sync::Arc;
 use homing_benchmark::cause::{is_in_view, right_pose, sighted_pose};
 use homing_benchmark::{Policy, StepRecord, run_episode};
 use homing_core::{Cell, Mode, OccupancyGrid, PlanarPose, Sighting};
-use homing_perception::PerceptionConfig;
+use homing_perception::{PerceptionConfig, SiftConfig};
 use homing_planner::PlannerConfig;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{self, Episode, EpisodeSpec};
@@ -37,32 +38,29 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let photo = episode.camera.photo(&arena, episode.goal)?;
     save(&photo, &folder.join("goal.png"))?;
     let policy = if has("straight") { Policy::Straight } else { Policy::Frontier };
+    // Nothing to recognise: the planner alone, fast.
+    let nothing = SiftConfig { keypoints_max: 8, side_max_px: 64, ..SiftConfig::default() };
+    let sift = if has("blind") { nothing } else { SiftConfig::default() };
+    let perception = PerceptionConfig { sift, ..PerceptionConfig::default() };
     let mut marks = Vec::new();
     let mut map = None;
-    let run = run_episode(
-        &arena,
-        &episode,
-        PerceptionConfig::default(),
-        PlannerConfig::default(),
-        policy.build(),
-        &mut |r| {
-            print_step(&arena, &episode, r);
-            let sighted = sighted_pose(r).zip(right_pose(r));
-            if has("frames") || (has("wrong") && sighted.is_some_and(|(_, right)| !right)) {
-                let name = folder.join(format!("step{:03}.png", r.state.step));
-                if let Err(cause) = save_matches(r, &photo, &name) {
-                    eprintln!("{cause}");
-                }
+    let run = run_episode(&arena, &episode, perception, PlannerConfig::default(), policy.build(), &mut |r| {
+        print_step(&arena, &episode, r);
+        let sighted = sighted_pose(r).zip(right_pose(r));
+        if has("frames") || (has("wrong") && sighted.is_some_and(|(_, right)| !right)) {
+            let name = folder.join(format!("step{:03}.png", r.state.step));
+            if let Err(cause) = save_matches(r, &photo, &name) {
+                eprintln!("{cause}");
             }
-            let to_world = |p: PlanarPose| in_world(&episode, p);
-            marks.push(Mark {
-                pose: r.pose_truth,
-                mode: r.state.mode,
-                sighted: sighted.map(|(p, right)| (to_world(p), right)),
-            });
-            map = Some(r.map.clone());
-        },
-    )?;
+        }
+        let to_world = |p: PlanarPose| in_world(&episode, p);
+        marks.push(Mark {
+            pose: r.pose_truth,
+            mode: r.state.mode,
+            sighted: sighted.map(|(p, right)| (to_world(p), right)),
+        });
+        map = Some(r.map.clone());
+    })?;
     println!("{:?}: {}\n{:#?}", run.mode, run.reason, run.score);
     plan(&arena, &episode, map.as_ref(), &marks).save(folder.join("plan.png"))?;
     Ok(())

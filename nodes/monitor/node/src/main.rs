@@ -13,7 +13,7 @@ use clap::Parser;
 use homing_core::PlanarPose;
 use homing_monitor::{Recorder, RecorderConfig, Update};
 use homing_protocol::Session;
-use homing_protocol::process::{self, EXIT_CONFIG};
+use homing_protocol::process;
 
 use crate::config::{Config, Truth};
 use crate::hear::Ears;
@@ -32,26 +32,11 @@ struct Args {
 const FINISH_MAX: Duration = Duration::from_secs(20);
 
 fn main() -> ExitCode {
-    process::start_log();
-    let config: Config = match process::read_config(&Args::parse().config) {
-        Ok(config) => config,
-        Err(cause) => {
-            tracing::error!("{cause}");
-            return ExitCode::from(EXIT_CONFIG);
-        }
-    };
-    match run(config) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(cause) => {
-            tracing::error!("{cause:#}");
-            ExitCode::FAILURE
-        }
-    }
+    process::run(&Args::parse().config, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    tracing::info!(?config, "effective configuration");
     let recorder = Recorder::new(recorder_config(&config))?;
     if let Some(url) = recorder.url() {
         tracing::info!(url, "viewers connect here");

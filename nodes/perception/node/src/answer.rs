@@ -12,15 +12,14 @@ pub struct Answerer {
     estimator: GoalEstimator,
     goal_id: Option<u64>,
     last: Option<(RgbdFrame, GoalEstimate)>,
-    clock_restarted: bool,
 }
 
 /// A stamp this much before the last one means that the robot's clock began anew.
-const CLOCK_RESTART: Duration = Duration::from_secs(1);
+const CLOCK_RESTART: Duration = Duration::from_millis(500);
 
 impl Answerer {
     pub fn new(config: PerceptionConfig) -> Result<Self, PerceptionError> {
-        Ok(Self { estimator: GoalEstimator::new(config)?, goal_id: None, last: None, clock_restarted: false })
+        Ok(Self { estimator: GoalEstimator::new(config)?, goal_id: None, last: None })
     }
 
     /// A goal photo arrived. The same one again changes nothing; a new one is looked for in the last frame at once.
@@ -54,16 +53,10 @@ impl Answerer {
     pub fn again(&mut self, stamp: Stamp) -> Option<GoalEstimate> {
         let (frame, estimate) = self.last.as_ref()?;
         if frame.stamp.since(stamp) > CLOCK_RESTART {
-            self.clock_restarted = true;
             self.last = None;
             return None;
         }
         (frame.stamp == stamp).then(|| estimate.clone())
-    }
-
-    /// True once after the robot's clock began anew.
-    pub fn take_clock_restart(&mut self) -> bool {
-        std::mem::take(&mut self.clock_restarted)
     }
 }
 

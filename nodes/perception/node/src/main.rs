@@ -11,7 +11,7 @@ use clap::Parser;
 use homing_core::RgbdFrame;
 use homing_protocol::assemble::Part;
 use homing_protocol::convert::{ToDomain, ToMessage, to_depth, to_rgb};
-use homing_protocol::process::{self, EXIT_CONFIG};
+use homing_protocol::process;
 use homing_protocol::{FrameAssembler, Session, topics};
 
 use crate::answer::Answerer;
@@ -27,26 +27,11 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    process::start_log();
-    let config: Config = match process::read_config(&Args::parse().config) {
-        Ok(config) => config,
-        Err(cause) => {
-            tracing::error!("{cause}");
-            return ExitCode::from(EXIT_CONFIG);
-        }
-    };
-    match run(config) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(cause) => {
-            tracing::error!("{cause:#}");
-            ExitCode::FAILURE
-        }
-    }
+    process::run(&Args::parse().config, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    tracing::info!(?config, "effective configuration");
     let mut answerer = Answerer::new(config.perception()).context("perception cannot start")?;
     let session = Session::open(&config.session.session("perception"))?;
     let colors = session.subscribe(&topics::CAMERA_COLOR, 2)?;
@@ -80,9 +65,6 @@ async fn run(config: Config) -> anyhow::Result<()> {
             Ok(None) => {}
             // Whatever came was not usable: say so, and go on with the next.
             Err(cause) => tracing::warn!("ignored: {cause:#}"),
-        }
-        if answerer.take_clock_restart() {
-            assembler.reset();
         }
     }
     session.close();

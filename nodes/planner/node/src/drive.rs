@@ -18,6 +18,10 @@ const GOAL_PERIOD: Duration = Duration::from_secs(1);
 const TICK: Duration = Duration::from_millis(20);
 /// Once perception let a whole wait pass, it gets only this much per step until it answers again.
 const LATE_ANSWER_MAX: Duration = Duration::from_millis(20);
+/// After so many waits in vain, perception counts as hanging.
+const MISSES_MAX: u32 = 3;
+/// The stop at the end of a mission is sent again for so long.
+const CLOSING_MAX: Duration = Duration::from_secs(3);
 /// The map is sent with every n-th step: it is for people.
 const MAP_EVERY: u64 = 5;
 
@@ -33,6 +37,10 @@ pub struct Driver {
     mission: Option<Active>,
     announced: Option<PlannerMission>,
     perception: Answering,
+    /// Waits for perception that ended without an answer, in a row.
+    misses: u32,
+    /// The stop that ended the last mission, until the body confirms it.
+    closing: Option<Outstanding>,
 }
 
 /// The mission under way.
@@ -73,11 +81,13 @@ impl Driver {
             mission: None,
             announced: None,
             perception: Answering::InTime,
+            misses: 0,
+            closing: None,
         }
     }
 
     /// Takes in whatever arrives next; returns after [`TICK`] at the latest.
-    pub async fn hear(&mut self, _session: &Session) {
+    pub async fn hear(&mut self) {
         let links = &self.links;
         let heard: anyhow::Result<()> = tokio::select! {
             depth = links.depths.recv() => depth.map_err(Into::into)
@@ -85,7 +95,7 @@ impl Driver {
             info = links.infos.recv() => info.map_err(Into::into)
                 .and_then(|i| { let i = i.message.to_domain()?; self.moments.intrinsics(i.stamp, i.intrinsics); Ok(()) }),
             odometry = links.odometry.recv() => odometry.map_err(Into::into)
-                .and_then(|o| { self.moments.odometry(o.message.to_domain()?); Ok(()) }),
+                .and_then(|o| { if self.moments.odometry(o.message.to_domain()?) { self.start_over(); } Ok(()) }),
             mount = links.mounts.recv() => mount.map_err(Into::into)
                 .and_then(|m| { if let Some(mount) = to_camera_mount(&m.message)? { self.moments.mount(mount); } Ok(()) }),
             estimate = links.estimates.recv() => estimate.map_err(Into::into).and_then(|e| {
@@ -97,7 +107,7 @@ impl Driver {
                 Ok(())
             }),
             result = links.results.recv() => result.map_err(Into::into)
-                .and_then(|r| { let result = r.message.to_domain()?; settle(&mut self.mission, result); Ok(()) }),
+                .and_then(|r| { let result = r.message.to_domain()?; self.settle(result); Ok(()) }),
             mission = self.missions.next() => { begin(self, mission); Ok(()) }
             () = tokio::time::sleep(TICK) => Ok(()),
         };
@@ -116,15 +126,51 @@ impl Driver {
         Ok(())
     }
 
-    /// Tells the body to stand still.
-    pub fn halt(&mut self) {
+    /// Tells the body to stand still, and ends the mission for whoever waits for it.
+    pub fn leave(&mut self) {
         if self.mission.is_some() {
-            // Stamped with the newest reading of the robot's clock: a stop must not arrive expired.
-            let stamp = self.moments.clock();
-            let command = self.command(stamp, Motion::Stop { done: false });
-            if let Err(cause) = self.links.command.publish(&command.to_message()) {
-                tracing::error!(%cause, "the last stop was not sent; the body's own watchdog stops it");
-            }
+            self.stand(Motion::Stop { done: false });
+            self.finish(Outcome::Failed, "the planner was stopped".to_owned());
+        }
+    }
+
+    /// Sends a stop, and again until the body confirms it or a limit is over.
+    fn stand(&mut self, motion: Motion) {
+        // Stamped with the newest reading of the robot's clock: a stop must not arrive expired.
+        let command = self.command(self.moments.clock(), motion);
+        if let Err(cause) = self.links.command.publish(&command.to_message()) {
+            tracing::error!(%cause, "a stop was not sent; the body's own watchdog stops it");
+        }
+        let now = Instant::now();
+        self.closing = Some(Outstanding { command, first_sent: now, last_sent: now });
+    }
+
+    /// The robot's clock began anew: what was decided before it is void.
+    fn start_over(&mut self) {
+        tracing::warn!("the robot's clock began anew: going on from its new beginning");
+        self.closing = None;
+        if let Some(active) = &mut self.mission {
+            (active.command, active.result, active.waiting_since) = (None, None, None);
+            active.next_from = Stamp(0);
+        }
+    }
+
+    fn settle(&mut self, result: MotionResult) {
+        let answers = |o: &Outstanding| (o.command.session, o.command.sequence) == (result.session, result.sequence);
+        if self.closing.as_ref().is_some_and(answers) {
+            self.closing = None;
+        }
+        let Some(active) = &mut self.mission else { return };
+        if active.command.as_ref().is_some_and(answers) {
+            tracing::debug!(
+                sequence = result.sequence,
+                at_s = result.outcome.stamp.seconds(),
+                blocked = result.outcome.blocked,
+                "result"
+            );
+            active.command = None;
+            active.next_from = result.outcome.stamp;
+            active.result = Some(result);
         }
     }
 
@@ -138,11 +184,21 @@ impl Driver {
     }
 
     fn send_again(&mut self) -> anyhow::Result<()> {
+        if let Some(closing) = &mut self.closing {
+            if closing.first_sent.elapsed() > CLOSING_MAX {
+                tracing::error!("the body did not confirm the last stop; its own watchdog stops it");
+                self.closing = None;
+            } else if closing.last_sent.elapsed() >= self.config.pace.resend() {
+                closing.last_sent = Instant::now();
+                self.links.command.publish(&closing.command.to_message())?;
+            }
+        }
         let Some(active) = &mut self.mission else { return Ok(()) };
         let Some(outstanding) = &mut active.command else { return Ok(()) };
         if outstanding.first_sent.elapsed() > self.config.pace.result_max() {
             tracing::error!(sequence = outstanding.command.sequence, "the body gave no result; going on without it");
-            active.next_from = Stamp(outstanding.command.stamp.0 + 1);
+            // In lockstep the world still stands at that moment.
+            active.next_from = outstanding.command.stamp;
             active.command = None;
         } else if outstanding.last_sent.elapsed() >= self.config.pace.resend() {
             outstanding.last_sent = Instant::now();
@@ -159,6 +215,7 @@ impl Driver {
         }
         if let Some(observation) = self.moments.newest_answered(active.next_from) {
             note(&mut self.perception, Answering::InTime);
+            self.misses = 0;
             return Some((observation, Perception::Present));
         }
         let observation = self.moments.newest(active.next_from)?;
@@ -172,7 +229,10 @@ impl Driver {
             return None;
         }
         note(&mut self.perception, Answering::Late);
-        Some((observation, Perception::Absent))
+        // One late answer is not a perception that hangs.
+        self.misses = self.misses.saturating_add(1);
+        let perception = if self.misses < MISSES_MAX { Perception::Present } else { Perception::Absent };
+        Some((observation, perception))
     }
 
     fn step(&mut self, observation: PlannerObservation, perception: Perception) -> anyhow::Result<()> {
@@ -199,8 +259,7 @@ impl Driver {
         let (mode, reason) = (state.mode, state.reason.clone());
         if let Some(outcome) = ended(mode, action) {
             // Only a goal that is believed reached is declared; a planner that gave up just stands.
-            let command = self.command(stamp, Motion::Stop { done: outcome == Outcome::Arrived });
-            self.links.command.publish(&command.to_message())?;
+            self.stand(Motion::Stop { done: outcome == Outcome::Arrived });
             self.finish(outcome, reason);
             return Ok(());
         }
@@ -271,22 +330,6 @@ fn ended(mode: Mode, action: Action) -> Option<Outcome> {
     }
 }
 
-fn settle(mission: &mut Option<Active>, result: MotionResult) {
-    let Some(active) = mission else { return };
-    let answers = |o: &Outstanding| o.command.session == result.session && o.command.sequence == result.sequence;
-    if active.command.as_ref().is_some_and(answers) {
-        tracing::debug!(
-            sequence = result.sequence,
-            at_s = result.outcome.stamp.seconds(),
-            blocked = result.outcome.blocked,
-            "result"
-        );
-        active.command = None;
-        active.next_from = result.outcome.stamp;
-        active.result = Some(result);
-    }
-}
-
 fn begin(driver: &mut Driver, mission: Option<Mission>) {
     match mission {
         Some(Mission::Start(photo)) => {
@@ -305,7 +348,7 @@ fn begin(driver: &mut Driver, mission: Option<Mission>) {
             });
         }
         Some(Mission::Cancel) => {
-            driver.halt();
+            driver.stand(Motion::Stop { done: false });
             driver.finish(Outcome::Cancelled, "cancelled by the operator".to_owned());
         }
         None => {}

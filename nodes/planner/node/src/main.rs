@@ -13,7 +13,7 @@ use clap::Parser;
 use homing_planner::Planner;
 use homing_protocol::Session;
 use homing_protocol::navigate::NavigateServer;
-use homing_protocol::process::{self, EXIT_CONFIG};
+use homing_protocol::process;
 
 use crate::config::Config;
 use crate::drive::Driver;
@@ -29,26 +29,11 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    process::start_log();
-    let config: Config = match process::read_config(&Args::parse().config) {
-        Ok(config) => config,
-        Err(cause) => {
-            tracing::error!("{cause}");
-            return ExitCode::from(EXIT_CONFIG);
-        }
-    };
-    match run(config) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(cause) => {
-            tracing::error!("{cause:#}");
-            ExitCode::FAILURE
-        }
-    }
+    process::run(&Args::parse().config, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    tracing::info!(?config, "effective configuration");
     let planner = Planner::new(config.planner(), config.policy.build()).context("planner cannot start")?;
     let session = Session::open(&config.session.session("planner"))?;
     let links = Links::open(&session)?;
@@ -61,13 +46,13 @@ async fn run(config: Config) -> anyhow::Result<()> {
     loop {
         tokio::select! {
             () = &mut stop => break,
-            () = driver.hear(&session) => {}
+            () = driver.hear() => {}
         }
         tokio::task::block_in_place(|| driver.act(&session))?;
     }
     // The robot stands before its planner leaves.
-    driver.halt();
-    tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    driver.leave();
+    tokio::time::sleep(std::time::Duration::from_millis(150)).await;
     session.close();
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use homing_core::{
     Base, Camera, DepthImage, GoalEstimate, Intrinsics, Odometry, Sighting, Stamp, Transform, UnseenReason,
@@ -10,6 +11,8 @@ use homing_planner::PlannerObservation;
 
 /// Moments kept while their parts are still arriving.
 const WAITING_MAX: usize = 16;
+/// A stamp this much before the last one means that the robot's clock began anew: a restart or a reset.
+const CLOCK_RESTART: Duration = Duration::from_millis(500);
 /// Odometry kept: five seconds at 50 Hz.
 const ODOMETRY_MAX: usize = 256;
 
@@ -39,12 +42,18 @@ impl Moments {
         self.parts(stamp).intrinsics = Some(intrinsics);
     }
 
-    pub fn odometry(&mut self, odometry: Odometry) {
+    /// Keeps a reading; says whether the robot's clock began anew, which makes all that was kept worthless.
+    pub fn odometry(&mut self, odometry: Odometry) -> bool {
+        let began_anew = self.clock.since(odometry.stamp) > CLOCK_RESTART;
+        if began_anew {
+            self.clear();
+        }
         self.clock = odometry.stamp;
         self.odometry.insert(odometry.stamp, odometry);
         while self.odometry.len() > ODOMETRY_MAX {
             self.odometry.pop_first();
         }
+        began_anew
     }
 
     pub fn mount(&mut self, t_base_camera: Transform<Base, Camera>) {

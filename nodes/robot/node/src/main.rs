@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use homing_protocol::Session;
-use homing_protocol::process::{self, EXIT_CONFIG};
+use homing_protocol::process;
 use homing_robot::replay::{Recording, ReplayBody};
 
 use crate::config::Config;
@@ -23,26 +23,11 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    process::start_log();
-    let config: Config = match process::read_config(&Args::parse().config) {
-        Ok(config) => config,
-        Err(cause) => {
-            tracing::error!("{cause}");
-            return ExitCode::from(EXIT_CONFIG);
-        }
-    };
-    match run(config) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(cause) => {
-            tracing::error!("{cause:#}");
-            ExitCode::FAILURE
-        }
-    }
+    process::run(&Args::parse().config, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    tracing::info!(?config, "effective configuration");
     let session = Session::open(&config.session.body())?;
     let recording = Recording::open(&config.recording)?;
     let frames = if config.frames.is_empty() { recording.numbers().collect() } else { config.frames };
