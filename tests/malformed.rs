@@ -7,6 +7,7 @@ use homing_core::{
     DepthImage, GoalEstimate, GridGeometry, Intrinsics, MatchedPoint, OccupancyGrid, Odometry, RgbImage, Sighting,
     StageTimes, Stamp, Transform, UnseenReason,
 };
+use homing_privileged::GroundTruth;
 use homing_protocol::convert::{
     CameraInfoMessage, EncodedPhoto, camera_mount_message, color_message, depth_message, to_camera_mount, to_depth,
     to_rgb, to_velocity,
@@ -293,7 +294,7 @@ fn malformed_images() {
 #[test]
 fn truths_that_are_none() {
     type M = homing_msgs::GroundTruth;
-    refused(
+    refused::<M, GroundTruth>(
         &M::default(),
         M::to_domain,
         &[

@@ -12,6 +12,7 @@ import time
 from peer import Reader, Writer, connect, types
 
 LIMIT_S = 60
+SILENCE_NS = 500_000_000
 
 
 def nanoseconds(header):
@@ -65,11 +66,13 @@ def drive(session, store):
         writer.publish(message)
         time.sleep(0.05)
         turned = math.remainder(yaw(reader.messages[-1]) - yaw(before), math.tau)
-    time.sleep(1.0)
-    first, last = reader.messages[-5], reader.messages[-1]
+    # Silence, on the robot's own clock: a busy simulator's is slower than the wall's.
+    said = nanoseconds(reader.messages[-1].header)
+    first = reader.wait(LIMIT_S, lambda o: nanoseconds(o.header) > said + SILENCE_NS)
+    last = reader.wait(LIMIT_S, lambda o: nanoseconds(o.header) > said + 2 * SILENCE_NS)
     return {
         "turned_rad": turned,
-        "turning_after_silence_rad_s": last.twist.twist.angular.z,
+        "turning_after_silence_rad_s": first.twist.twist.angular.z,
         "crept_rad": abs(yaw(last) - yaw(first)),
     }
 
