@@ -117,7 +117,7 @@ impl Drive {
     /// Ctrl-C in mid-episode: every process leaves in order, the planner first.
     async fn leave(mut self) {
         let commands = self.session.subscribe(&topics::MOTION_COMMAND, 1).unwrap();
-        tokio::time::timeout(LIMIT, commands.recv()).await.expect("the planner still commands").unwrap();
+        tokio::time::timeout(LIMIT, commands.recv()).await.unwrap().unwrap();
         for process in [&mut self.planner, &mut self.body] {
             process.signal(Signal::SIGINT);
             assert_eq!(process.ends().code(), SUCCESS, "{}", process.said());
