@@ -1,5 +1,5 @@
 //! One contract, one suite, every body: what holds for a robot whatever stands behind the seam.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
+#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail by panicking")]
 
 use std::fs;
 use std::path::Path;

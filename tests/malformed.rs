@@ -1,5 +1,5 @@
 //! Messages that describe no value are refused with a reason; images of other makes are read; what is no depth is masked.
-#![expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail by panicking")]
 
 use std::fmt::Debug;
 
@@ -67,8 +67,11 @@ fn depths_that_are_none_are_masked() {
     assert_eq!(nothing.valid_share(), 0.0, "an image without a single depth is an image all the same");
 }
 
+/// What the refusal must say, and what breaks the message.
+type Case<'a, M> = (&'a str, fn(&mut M));
+
 /// Breaks a good message and expects a refusal that names what is wrong.
-fn refused<M: Clone, T: Debug>(good: &M, read: impl Fn(&M) -> Result<T, Malformed>, cases: &[(&str, fn(&mut M))]) {
+fn refused<M: Clone, T: Debug>(good: &M, read: impl Fn(&M) -> Result<T, Malformed>, cases: &[Case<M>]) {
     assert!(read(good).is_ok(), "the message was bad before it was broken");
     for (says, breaks) in cases {
         let mut message = good.clone();

@@ -1,5 +1,5 @@
 //! A body in real time: who may move it, and that silence and the end of its process stop it.
-#![expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail by panicking")]
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
 //! What `protocol` promises of the network, over real sessions: a router and a client in one process.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
+#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail by panicking")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
