@@ -68,7 +68,12 @@ fn a_recording_is_complete_and_readable() {
     for k in 1..20 {
         recorder.offer(frame(k));
         recorder.offer(state(k));
-        std::thread::sleep(Duration::from_millis(5));
+        // No faster than the recorder shows them: on a loaded machine it would rightly drop some.
+        let deadline = Instant::now() + Duration::from_secs(10);
+        while recorder.status().shown < 2 * k {
+            assert!(Instant::now() < deadline, "{:?}", recorder.status());
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
     recorder.offer(log("the last line"));
     recorder.offer(Update::Verdict("## Over".to_owned()));
