@@ -84,6 +84,9 @@ pub struct Terrain {
     inflated_square: i16,
 }
 
+/// A metre through a gap that leaves no margin counts as so many: the body gets through, but slowly.
+const TIGHT_COST: f32 = 3.0;
+
 /// How much room a route must keep.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum Room {
@@ -174,12 +177,15 @@ impl Terrain {
         }
     }
 
-    /// 1 for a free cell with room for the body, infinite otherwise.
+    /// 1 for a free cell with room for the body and its margin, more where only the bare body fits, infinite otherwise.
     #[inline]
     #[must_use]
     pub fn distance_cost(&self, map: &OccupancyGrid, index: usize) -> f32 {
-        let open = map.cells[index] == Cell::Free && self.square[index] >= self.inflated_square;
-        if open { 1.0 } else { f32::INFINITY }
+        match (map.cells[index], self.square[index]) {
+            (Cell::Free, square) if square >= self.inflated_square => 1.0,
+            (Cell::Free, square) if square >= self.hard_square => TIGHT_COST,
+            _ => f32::INFINITY,
+        }
     }
 
     /// Squared distance to the nearest obstacle, cells, capped.
