@@ -53,6 +53,27 @@ fn a_misspelt_key_is_named() {
 }
 
 #[test]
+fn a_value_that_cannot_work_is_named() {
+    let system = System::new();
+    ends_saying(system.start("homing-planner", "[map]\nside_m = -1.0"), CONFIG, &["ERROR", "map_side_m", "-1"]);
+    ends_saying(
+        system.start("homing-perception", "[features]\nkeypoints_max = 1"),
+        CONFIG,
+        &["keypoints_max", "8..=20000"],
+    );
+}
+
+#[test]
+fn a_process_leaves_with_whoever_started_it() {
+    let system = System::new();
+    let listen = format!("[session]\nlisten = [\"{}\"]\n", system.endpoint());
+    let (mut body, stdin) = system.follower("homing-sim", &listen);
+    body.says("the body is ready");
+    drop(stdin);
+    ends_saying(body, SUCCESS, &["whoever started this process is gone"]);
+}
+
+#[test]
 fn a_taken_port_is_named() {
     let system = System::new();
     let _taken = TcpListener::bind(("127.0.0.1", system.port())).unwrap();

@@ -1,6 +1,6 @@
 //! What every body says, whether simulated, recorded or real.
 
-use homing_core::{Base, Camera, MotionResult, Observation, Odometry, Stamp, Transform};
+use homing_core::{Base, Camera, MotionResult, Observation, Odometry, Transform};
 
 use crate::convert::{CameraInfoMessage, Lease, ToMessage, camera_mount_message, color_message, depth_message, to_tf};
 use crate::interfaces::{homing_msgs, nav_msgs, sensor_msgs, tf2_msgs};
@@ -65,14 +65,6 @@ impl BodyPublishers {
     pub fn odometry(&self, odometry: &Odometry) -> Result<(), PublishError> {
         self.tf.publish(&to_tf(odometry))?;
         self.odom.publish(&odometry.to_message())
-    }
-
-    /// Where the camera sits, for whoever joined late.
-    ///
-    /// # Errors
-    /// [`PublishError`] when the session is closed.
-    pub fn mount(&self, stamp: Stamp) -> Result<(), PublishError> {
-        self.tf_static.publish(&camera_mount_message(stamp, &self.t_base_camera))
     }
 
     /// What a command came to.

@@ -16,7 +16,7 @@ use hiroz::pubsub::ZPub;
 use hiroz::{Builder, ServiceTypeInfo};
 use homing_core::Mode;
 use thiserror::Error;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinHandle;
 
 use crate::convert::{EncodedPhoto, ToDomain, ToMessage};
@@ -37,13 +37,17 @@ const SUCCEEDED: i8 = 4;
 const CANCELED: i8 = 5;
 const ABORTED: i8 = 6;
 
+/// Which of the operator's wishes is meant: a goal may end while the next one is already on its way.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub struct MissionId(GoalId);
+
 /// What the planner is asked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mission {
     /// Drive to this photo.
-    Start(EncodedPhoto),
+    Start(MissionId, EncodedPhoto),
     /// Leave it.
-    Cancel,
+    Cancel(MissionId),
 }
 
 /// How a mission ended, in the planner's own judgement.
@@ -132,6 +136,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl NavigateServer {
     /// Ended goals remembered for late result requests.
     const ENDED_MAX: usize = 16;
+    /// Questions for a result that may wait side by side.
+    const WAITING_MAX: usize = 32;
+    /// Nobody waits longer for an answer: zenoh ends a query after 10 s, and clients ask again.
+    const QUESTION_MAX: Duration = Duration::from_secs(10);
 
     /// Announces the action. Needs a multi-threaded tokio runtime.
     ///
@@ -185,16 +193,22 @@ impl NavigateServer {
                     continue;
                 };
                 let (request, reply) = request.into_parts();
-                let accepted = match request.goal.photo.to_domain() {
-                    Ok(photo) => to_planner.try_send(Mission::Start(photo)).is_ok(),
-                    Err(cause) => {
+                let accepted = match (request.goal.photo.to_domain(), to_planner.try_reserve()) {
+                    (Ok(photo), Ok(place)) => {
+                        // Known before the planner hears of it: it may end the mission at once.
+                        state.begin(request.goal_id);
+                        place.send(Mission::Start(MissionId(request.goal_id), photo));
+                        true
+                    }
+                    (Err(cause), _) => {
                         tracing::warn!(%cause, "goal refused");
                         false
                     }
+                    (_, Err(_)) => {
+                        tracing::warn!("goal refused: too many goals at once");
+                        false
+                    }
                 };
-                if accepted {
-                    state.begin(request.goal_id);
-                }
                 let answer = SendGoalResponse { accepted, stamp_sec: 0, stamp_nanosec: 0 };
                 if let Err(cause) = reply.reply(&answer).await {
                     tracing::warn!(%cause, "goal answer not sent");
@@ -203,6 +217,7 @@ impl NavigateServer {
         }));
 
         let state = Arc::clone(&shared);
+        let waiting = Arc::new(Semaphore::new(Self::WAITING_MAX));
         tasks.push(tokio::spawn(async move {
             loop {
                 let Ok(request) = results.async_take_request().await else {
@@ -210,10 +225,16 @@ impl NavigateServer {
                     continue;
                 };
                 let (request, reply) = request.into_parts();
+                let Ok(place) = Arc::clone(&waiting).try_acquire_owned() else {
+                    tracing::warn!("a question for a result was dropped: too many wait already");
+                    continue;
+                };
                 let state = Arc::clone(&state);
-                // Waits for as long as the mission lasts, without holding up anybody else.
+                // Waits without holding up anybody else, and not longer than whoever asked.
                 tokio::spawn(async move {
-                    let (status, result) = state.end_of(request.goal_id).await;
+                    let _place = place;
+                    let end = tokio::time::timeout(Self::QUESTION_MAX, state.end_of(request.goal_id));
+                    let Ok((status, result)) = end.await else { return };
                     if let Err(cause) = reply.reply(&GetResultResponse { status, result }).await {
                         tracing::debug!(%cause, "result answer not sent");
                     }
@@ -229,9 +250,10 @@ impl NavigateServer {
                     continue;
                 };
                 let (request, reply) = request.into_parts();
-                let known = lock(&state.current).as_ref().is_some_and(|c| c.id == request.goal_info.goal_id);
+                let id = request.goal_info.goal_id;
+                let known = lock(&state.current).as_ref().is_some_and(|c| c.id == id);
                 // Return codes of action_msgs/srv/CancelGoal: 0 accepted, 2 unknown goal.
-                let return_code = if known && sender.try_send(Mission::Cancel).is_ok() { 0 } else { 2 };
+                let return_code = if known && sender.try_send(Mission::Cancel(MissionId(id))).is_ok() { 0 } else { 2 };
                 let goals_canceling = if return_code == 0 { vec![request.goal_info] } else { Vec::new() };
                 if let Err(cause) = reply.reply(&CancelGoalServiceResponse { return_code, goals_canceling }).await {
                     tracing::debug!(%cause, "cancel answer not sent");
@@ -241,19 +263,13 @@ impl NavigateServer {
         Ok(Self { missions, shared, feedback, _status: status, tasks })
     }
 
-    /// What was asked since the last call.
-    pub fn try_next(&mut self) -> Option<Mission> {
-        self.missions.try_recv().ok()
-    }
-
     /// Waits until something is asked. Cancel-safe.
     pub async fn next(&mut self) -> Option<Mission> {
         self.missions.recv().await
     }
 
     /// Tells clients where the mission stands. Lost feedback is no loss.
-    pub fn progress(&self, progress: &Progress) {
-        let Some(goal_id) = lock(&self.shared.current).as_ref().map(|c| c.id) else { return };
+    pub fn progress(&self, MissionId(goal_id): MissionId, progress: &Progress) {
         let feedback = NavigateToImageFeedback {
             step: progress.step,
             mode: progress.mode as u8,
@@ -266,8 +282,8 @@ impl NavigateServer {
         }
     }
 
-    /// Ends the mission under way.
-    pub fn finish(&self, report: &MissionReport) {
+    /// Ends a mission. One that another goal has replaced has ended already.
+    pub fn finish(&self, MissionId(goal_id): MissionId, report: &MissionReport) {
         let (status, outcome) = match report.outcome {
             Outcome::Arrived => (SUCCEEDED, 0),
             Outcome::Failed => (ABORTED, 1),
@@ -279,7 +295,7 @@ impl NavigateServer {
             path_length_m: report.path_length_m,
             message: report.message.clone(),
         };
-        self.shared.end((status, result));
+        self.shared.end(goal_id, (status, result));
     }
 }
 
@@ -296,12 +312,20 @@ impl Shared {
             message: "another goal took its place".to_owned(),
             ..Default::default()
         };
-        self.end((ABORTED, superseded));
-        *lock(&self.current) = Some(Current { id, end: watch::Sender::new(None) });
+        let previous = lock(&self.current).replace(Current { id, end: watch::Sender::new(None) });
+        if let Some(previous) = previous {
+            self.settle(previous, (ABORTED, superseded));
+        }
     }
 
-    fn end(&self, end: End) {
-        let Some(current) = lock(&self.current).take() else { return };
+    fn end(&self, id: GoalId, end: End) {
+        let current = lock(&self.current).take_if(|c| c.id == id);
+        if let Some(current) = current {
+            self.settle(current, end);
+        }
+    }
+
+    fn settle(&self, current: Current, end: End) {
         let mut ended = lock(&self.ended);
         if ended.len() == NavigateServer::ENDED_MAX {
             ended.remove(0);

@@ -1,10 +1,13 @@
 //! What every process does at its start and end: read its one configuration file, say what holds, and stop when told.
 
+use std::error::Error;
 use std::io::IsTerminal;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use nix::sys::signal::{Signal, raise};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
@@ -15,7 +18,30 @@ use crate::session::{DEFAULT_ENDPOINT, Link, SessionConfig};
 /// Exit code for a configuration that cannot be used (EX_CONFIG of sysexits).
 pub const EXIT_CONFIG: u8 = 78;
 
-/// Why a configuration cannot be used.
+/// The command line of every process.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ProcessArgs {
+    /// The process's TOML file; see deploy/.
+    #[arg(long, value_name = "FILE")]
+    pub config: PathBuf,
+    /// End when standard input closes: whoever started this process is gone, however that came.
+    #[arg(long)]
+    pub until_stdin_closes: bool,
+}
+
+/// A configuration that reads well and cannot work: a process's body returns it to end with [`EXIT_CONFIG`].
+#[derive(Debug, Error)]
+#[error("the configuration cannot be used: {0}")]
+pub struct Unusable(String);
+
+impl Unusable {
+    /// With the reason.
+    pub fn new(cause: impl std::fmt::Display) -> Self {
+        Self(cause.to_string())
+    }
+}
+
+/// Why a configuration file cannot be read.
 #[derive(Debug, Error)]
 pub enum ConfigFileError {
     /// The file cannot be read.
@@ -47,13 +73,16 @@ pub fn read_config<T: DeserializeOwned>(path: &Path) -> Result<T, ConfigFileErro
 }
 
 /// The whole of a process: its log, its configuration, its body, and the exit code for how that ended.
-pub fn run<C, E>(config: &Path, body: impl FnOnce(C) -> Result<(), E>) -> ExitCode
+pub fn run<C, E>(args: &ProcessArgs, body: impl FnOnce(C) -> Result<(), E>) -> ExitCode
 where
     C: DeserializeOwned + std::fmt::Debug,
-    E: std::fmt::Display,
+    E: std::fmt::Display + Deref<Target = dyn Error + Send + Sync>,
 {
     start_log();
-    let config: C = match read_config(config) {
+    if args.until_stdin_closes {
+        std::thread::spawn(end_with_stdin);
+    }
+    let config: C = match read_config(&args.config) {
         Ok(config) => config,
         Err(cause) => {
             tracing::error!("{cause}");
@@ -65,9 +94,16 @@ where
         Ok(()) => ExitCode::SUCCESS,
         Err(cause) => {
             tracing::error!("{cause:#}");
-            ExitCode::FAILURE
+            if cause.is::<Unusable>() { ExitCode::from(EXIT_CONFIG) } else { ExitCode::FAILURE }
         }
     }
+}
+
+/// Reads what nobody writes until the other end is gone, then stops this process as SIGTERM would.
+fn end_with_stdin() {
+    let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+    tracing::warn!("whoever started this process is gone: leaving");
+    let _ = raise(Signal::SIGTERM);
 }
 
 /// The `[session]` table of every process.

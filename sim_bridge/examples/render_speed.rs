@@ -1,5 +1,5 @@
-//! Frames per second of the renderer: `render_speed SCENE [frames]`, on a walk through the scene's bounding
-//! box. SCENE is a glTF file or the seed of a flat. The processor time (all threads, from /proc) does not depend on what else
+//! Frames per second of the renderer: `render_speed [SCENE] [frames]`, on a walk through the scene's bounding
+//! box. SCENE is a glTF file or the seed of a flat (default 1000). The processor time (all threads, from /proc) does not depend on what else
 //! the machine is doing.
 
 #![expect(clippy::unwrap_used, reason = "a measuring tool may fail by panicking")]
@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments.next().unwrap();
+    let path = arguments.next().unwrap_or_else(|| "1000".to_owned());
     let frames: usize = arguments.next().map_or(200, |n| n.parse().unwrap());
     let begin = Instant::now();
     let scene = Arc::new(load(&path));

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use homing_protocol::{Link, Session, SessionConfig};
@@ -67,7 +67,16 @@ impl System {
         let stem = format!("{binary}-{}", fs::read_dir(self.folder.path()).unwrap().count());
         let config = self.file(&format!("{stem}.toml"), config);
         let log = self.folder.path().join(format!("{stem}.log"));
-        Process::start(binary, &config, log)
+        Process::start(binary, &[], &config, log)
+    }
+
+    /// Starts a process that leaves with whoever started it: when its standard input, given back here, closes.
+    pub fn follower(&self, binary: &str, config: &str) -> (Process, ChildStdin) {
+        let config = self.file("follower.toml", config);
+        let log = self.folder.path().join("follower.log");
+        let mut process = Process::start(binary, &["--until-stdin-closes"], &config, log);
+        let stdin = process.child.stdin.take().unwrap();
+        (process, stdin)
     }
 
     /// Joins the network as an operator.
@@ -84,15 +93,17 @@ pub struct Process {
 }
 
 impl Process {
-    fn start(binary: &str, config: &Path, log: PathBuf) -> Self {
+    fn start(binary: &str, flags: &[&str], config: &Path, log: PathBuf) -> Self {
         let program = program(binary);
         let child = Command::new(&program)
+            .args(flags)
             .arg("--config")
             .arg(config)
             // The processes' own defaults are tested, not what this shell has set.
             .env_remove("RUST_LOG")
             .env("NO_COLOR", "1")
-            .stdin(Stdio::null())
+            // Open until it is taken, or the process is let go.
+            .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(File::create(&log).unwrap())
             .spawn()

@@ -62,10 +62,13 @@ pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
         ProgressStyle::with_template("{bar:30} {pos}/{len} episodes  [{elapsed}, about {eta} left]  {wide_msg}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(seeds.len() as u64).with_style(style);
+    eprintln!("{}", EpisodeRow::HEADER);
     let reached = std::sync::atomic::AtomicUsize::new(0);
     let report = bench(&seeds, &options, &|row: &EpisodeRow| {
         let n = reached.fetch_add(usize::from(row.score.success), std::sync::atomic::Ordering::Relaxed);
         bar.inc(1);
+        // Hours of work are not lost with the report: every episode is said as it ends.
+        bar.suspend(|| eprintln!("{row}"));
         bar.set_message(format!("{} reached the goal", n + usize::from(row.score.success)));
     })?;
     bar.finish_and_clear();

@@ -44,7 +44,9 @@ impl Fleet {
         let child = Command::new(&program)
             .arg("--config")
             .arg(config)
-            .stdin(Stdio::null())
+            // A pipe that closes with this program, even if it is killed: the robot is not left driving.
+            .arg("--until-stdin-closes")
+            .stdin(Stdio::piped())
             // Ctrl-C in a terminal is for this program, which stops the others in order.
             .process_group(0)
             .stdout(sink.try_clone()?)

@@ -19,7 +19,8 @@ use clap::{Parser, Subcommand};
 
 /// Show a robot a photo, and it drives to the place where the photo was taken.
 ///
-/// Exit codes: 0 the goal was reached (or all is well), 1 it was not, 2 wrong usage or bad input, 130 interrupted.
+/// Exit codes: 0 the goal was reached (or all is well), 1 it was not, 2 it could not run (wrong usage, bad input, a process that
+/// failed), 130 interrupted.
 #[derive(Parser)]
 #[command(name = "homing", version, arg_required_else_help = true)]
 struct Args {

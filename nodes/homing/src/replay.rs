@@ -204,6 +204,8 @@ async fn join(args: &ReplayArgs, fleet: &mut Fleet) -> anyhow::Result<Session> {
     let mut config = SessionConfig::new("homing", Link::Connect(vec![args.endpoint.clone()]));
     config.connect_timeout = Duration::from_secs(20);
     let session = tokio::task::block_in_place(|| Session::open(&config));
+    // Somebody answers: is it our body? One that found its port taken has ended by now.
+    tokio::time::sleep(Duration::from_millis(300)).await;
     check(fleet)?;
     Ok(session?)
 }

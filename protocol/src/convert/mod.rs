@@ -56,12 +56,18 @@ pub trait ToDomain<T> {
     fn to_domain(&self) -> Result<T, Malformed>;
 }
 
-pub(crate) fn time(stamp: Stamp) -> builtin_interfaces::Time {
+/// A stamp as ROS messages carry it.
+#[must_use]
+pub fn time(stamp: Stamp) -> builtin_interfaces::Time {
     let (seconds, nanoseconds) = stamp.to_parts();
     builtin_interfaces::Time { sec: i32::try_from(seconds).unwrap_or(i32::MAX), nanosec: nanoseconds }
 }
 
-pub(crate) fn stamp(time: &builtin_interfaces::Time, message: &'static str) -> Result<Stamp, Malformed> {
+/// The stamp of a `message`.
+///
+/// # Errors
+/// [`Malformed`] for a time before the clock's origin, or more nanoseconds than a second has.
+pub fn stamp(time: &builtin_interfaces::Time, message: &'static str) -> Result<Stamp, Malformed> {
     let seconds = u32::try_from(time.sec)
         .map_err(|_| Malformed::new(message, format!("stamp of {} s is before the clock's origin", time.sec)))?;
     if time.nanosec >= 1_000_000_000 {

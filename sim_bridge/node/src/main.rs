@@ -6,13 +6,12 @@ mod outgoing;
 mod real_time;
 mod world;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
 use homing_protocol::Session;
-use homing_protocol::process;
+use homing_protocol::process::{self, ProcessArgs};
 
 use crate::config::{Config, Pace};
 use crate::world::World;
@@ -21,13 +20,12 @@ use crate::world::World;
 #[derive(Parser)]
 #[command(name = "homing-sim", version)]
 struct Args {
-    /// The process's TOML file; see deploy/.
-    #[arg(long)]
-    config: PathBuf,
+    #[command(flatten)]
+    process: ProcessArgs,
 }
 
 fn main() -> ExitCode {
-    process::run(&Args::parse().config, run)
+    process::run(&Args::parse().process, run)
 }
 
 #[tokio::main]

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use homing_core::{PlanarPose, Stamp};
-use homing_protocol::convert::{Malformed, ToDomain, ToMessage};
+use homing_protocol::convert::{Malformed, ToDomain, ToMessage, stamp, time};
 use homing_protocol::interfaces::homing_msgs;
 use homing_protocol::interfaces::homing_msgs::srv::ResetEpisode;
 use homing_protocol::service::{ServiceError, call};
@@ -61,7 +61,6 @@ impl GroundTruth {
 
 impl ToMessage<homing_msgs::GroundTruth> for GroundTruth {
     fn to_message(&self) -> homing_msgs::GroundTruth {
-        let (seconds, nanoseconds) = self.stamp.to_parts();
         let mut message = homing_msgs::GroundTruth {
             x_m: self.pose.x_m,
             y_m: self.pose.y_m,
@@ -76,8 +75,7 @@ impl ToMessage<homing_msgs::GroundTruth> for GroundTruth {
             ..Default::default()
         };
         "world".clone_into(&mut message.header.frame_id);
-        message.header.stamp.sec = i32::try_from(seconds).unwrap_or(i32::MAX);
-        message.header.stamp.nanosec = nanoseconds;
+        message.header.stamp = time(self.stamp);
         message
     }
 }
@@ -89,10 +87,8 @@ impl ToDomain<GroundTruth> for homing_msgs::GroundTruth {
         if numbers.iter().any(|n| !n.is_finite()) {
             return Err(Malformed { message: NAME, reason: "a number is not finite".to_owned() });
         }
-        let seconds = u32::try_from(self.header.stamp.sec)
-            .map_err(|_| Malformed { message: NAME, reason: "negative stamp".to_owned() })?;
         Ok(GroundTruth {
-            stamp: Stamp::from_parts(seconds, self.header.stamp.nanosec),
+            stamp: stamp(&self.header.stamp, NAME)?,
             pose: PlanarPose { x_m: self.x_m, y_m: self.y_m, yaw_rad: self.yaw_rad },
             start: PlanarPose { x_m: self.start_x_m, y_m: self.start_y_m, yaw_rad: self.start_yaw_rad },
             path_length_m: self.path_length_m,

@@ -1,5 +1,6 @@
 //! Everything the monitor hears, turned into updates.
 
+use std::io::Cursor;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,6 +12,7 @@ use homing_protocol::convert::{EncodedPhoto, Lease, ToDomain, to_depth, to_rgb};
 use homing_protocol::interfaces::homing_msgs::{self, EpisodeSummary};
 use homing_protocol::interfaces::{nav_msgs, sensor_msgs};
 use homing_protocol::{FrameAssembler, Session, Subscription, topics};
+use image::{DynamicImage, ImageDecoder, ImageReader};
 
 use crate::still::Still;
 
@@ -115,7 +117,7 @@ impl Ears {
         if self.goal_id == Some(photo.id) {
             return Ok(());
         }
-        let image = image::load_from_memory(&photo.file)?.to_rgb8();
+        let image = upright(&photo.file)?.to_rgb8();
         let (width, height) = image.dimensions();
         let rgb = Arc::new(RgbImage::new(width, height, image.into_raw())?);
         let intrinsics = photo.intrinsics.resized(width, height)?;
@@ -160,6 +162,16 @@ impl Ears {
             say(recorder, Level::Warn, "body", lease.last_refusal.clone());
         }
     }
+}
+
+/// Decodes a photo as perception does: turned as its camera noted.
+fn upright(file: &[u8]) -> anyhow::Result<DynamicImage> {
+    // The limits on memory are the decoder's own.
+    let mut decoder = ImageReader::new(Cursor::new(file)).with_guessed_format()?.into_decoder()?;
+    let orientation = decoder.orientation()?;
+    let mut image = DynamicImage::from_decoder(decoder)?;
+    image.apply_orientation(orientation);
+    Ok(image)
 }
 
 fn say(recorder: &Recorder, level: Level, source: &str, text: String) {

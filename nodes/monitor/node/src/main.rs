@@ -4,7 +4,6 @@ mod config;
 mod hear;
 mod still;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -13,7 +12,7 @@ use clap::Parser;
 use homing_core::PlanarPose;
 use homing_monitor::{Recorder, RecorderConfig, Update};
 use homing_protocol::Session;
-use homing_protocol::process;
+use homing_protocol::process::{self, ProcessArgs};
 
 use crate::config::{Config, Truth};
 use crate::hear::Ears;
@@ -23,16 +22,15 @@ use crate::still::Still;
 #[derive(Parser)]
 #[command(name = "homing-monitor", version)]
 struct Args {
-    /// The process's TOML file; see deploy/.
-    #[arg(long)]
-    config: PathBuf,
+    #[command(flatten)]
+    process: ProcessArgs,
 }
 
 /// The longest wait for the recording to reach the disk.
 const FINISH_MAX: Duration = Duration::from_secs(20);
 
 fn main() -> ExitCode {
-    process::run(&Args::parse().config, run)
+    process::run(&Args::parse().process, run)
 }
 
 #[tokio::main]

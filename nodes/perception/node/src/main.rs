@@ -3,15 +3,13 @@
 mod answer;
 mod config;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::Parser;
 use homing_core::RgbdFrame;
 use homing_protocol::assemble::Part;
 use homing_protocol::convert::{ToDomain, ToMessage, to_depth, to_rgb};
-use homing_protocol::process;
+use homing_protocol::process::{self, ProcessArgs, Unusable};
 use homing_protocol::{FrameAssembler, Session, topics};
 
 use crate::answer::Answerer;
@@ -21,18 +19,17 @@ use crate::config::Config;
 #[derive(Parser)]
 #[command(name = "homing-perception", version)]
 struct Args {
-    /// The process's TOML file; see deploy/.
-    #[arg(long)]
-    config: PathBuf,
+    #[command(flatten)]
+    process: ProcessArgs,
 }
 
 fn main() -> ExitCode {
-    process::run(&Args::parse().config, run)
+    process::run(&Args::parse().process, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    let mut answerer = Answerer::new(config.perception()).context("perception cannot start")?;
+    let mut answerer = Answerer::new(config.perception()).map_err(Unusable::new)?;
     let session = Session::open(&config.session.session("perception"))?;
     let colors = session.subscribe(&topics::CAMERA_COLOR, 2)?;
     let depths = session.subscribe(&topics::CAMERA_DEPTH, 2)?;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use homing_core::{Action, Mode, Motion, MotionCommand, MotionResult, Stamp};
 use homing_planner::{Mission as PlannerMission, Perception, Planner, PlannerObservation, StepEvent};
 use homing_protocol::convert::{EncodedPhoto, ToDomain, ToMessage, to_camera_mount, to_depth};
-use homing_protocol::navigate::{Mission, MissionReport, NavigateServer, Outcome, Progress};
+use homing_protocol::navigate::{Mission, MissionId, MissionReport, NavigateServer, Outcome, Progress};
 use homing_protocol::{Session, topics};
 
 use crate::config::Config;
@@ -45,6 +45,7 @@ pub struct Driver {
 
 /// The mission under way.
 struct Active {
+    id: MissionId,
     photo: EncodedPhoto,
     photo_sent: Option<Instant>,
     command: Option<Outstanding>,
@@ -248,7 +249,8 @@ impl Driver {
             motion,
             perception,
         };
-        let action = self.planner.step(stamp, &event);
+        // The clock may have gone on while perception was waited for.
+        let action = self.planner.step(self.moments.clock().max(stamp), &event);
         tracing::debug!(at_s = stamp.seconds(), ?action, reason = self.planner.state().reason, "step");
         self.show()?;
         self.carry_out(stamp, action)
@@ -294,24 +296,24 @@ impl Driver {
             self.links.map.publish(&(state.stamp, self.planner.map()).to_message())?;
         }
         let distance = |goal: &homing_core::GoalHypothesis| state.pose.distance_to(goal.pose.x_m, goal.pose.y_m);
-        self.missions.progress(&Progress {
-            step: state.step,
-            mode: state.mode,
-            goal_distance_m: state.goal.as_ref().map(distance),
-            reason: state.reason.clone(),
-        });
+        if let Some(active) = &self.mission {
+            let progress = Progress {
+                step: state.step,
+                mode: state.mode,
+                goal_distance_m: state.goal.as_ref().map(distance),
+                reason: state.reason.clone(),
+            };
+            self.missions.progress(active.id, &progress);
+        }
         Ok(())
     }
 
     fn finish(&mut self, outcome: Outcome, message: String) {
         let Some(active) = self.mission.take() else { return };
         tracing::info!(?outcome, message, "mission ended");
-        self.missions.finish(&MissionReport {
-            outcome,
-            steps: self.planner.state().step,
-            path_length_m: active.path_length_m,
-            message,
-        });
+        let report =
+            MissionReport { outcome, steps: self.planner.state().step, path_length_m: active.path_length_m, message };
+        self.missions.finish(active.id, &report);
     }
 }
 
@@ -332,12 +334,13 @@ fn ended(mode: Mode, action: Action) -> Option<Outcome> {
 
 fn begin(driver: &mut Driver, mission: Option<Mission>) {
     match mission {
-        Some(Mission::Start(photo)) => {
+        Some(Mission::Start(id, photo)) => {
             tracing::info!(goal = photo.id, "mission begins");
             driver.moments.clear();
             driver.announced = Some(PlannerMission::Start { goal_id: photo.id });
             driver.perception = Answering::InTime;
             driver.mission = Some(Active {
+                id,
                 photo,
                 photo_sent: None,
                 command: None,
@@ -347,10 +350,11 @@ fn begin(driver: &mut Driver, mission: Option<Mission>) {
                 path_length_m: 0.0,
             });
         }
-        Some(Mission::Cancel) => {
+        Some(Mission::Cancel(id)) if driver.mission.as_ref().is_some_and(|active| active.id == id) => {
             driver.stand(Motion::Stop { done: false });
             driver.finish(Outcome::Cancelled, "cancelled by the operator".to_owned());
         }
-        None => {}
+        // Its mission has ended in the meantime.
+        Some(Mission::Cancel(_)) | None => {}
     }
 }

@@ -5,15 +5,13 @@ mod drive;
 mod links;
 mod moment;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::Parser;
 use homing_planner::Planner;
 use homing_protocol::Session;
 use homing_protocol::navigate::NavigateServer;
-use homing_protocol::process;
+use homing_protocol::process::{self, ProcessArgs, Unusable};
 
 use crate::config::Config;
 use crate::drive::Driver;
@@ -23,18 +21,17 @@ use crate::links::Links;
 #[derive(Parser)]
 #[command(name = "homing-planner", version)]
 struct Args {
-    /// The process's TOML file; see deploy/.
-    #[arg(long)]
-    config: PathBuf,
+    #[command(flatten)]
+    process: ProcessArgs,
 }
 
 fn main() -> ExitCode {
-    process::run(&Args::parse().config, run)
+    process::run(&Args::parse().process, run)
 }
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    let planner = Planner::new(config.planner(), config.policy.build()).context("planner cannot start")?;
+    let planner = Planner::new(config.planner(), config.policy.build()).map_err(Unusable::new)?;
     let session = Session::open(&config.session.session("planner"))?;
     let links = Links::open(&session)?;
     let missions = NavigateServer::announce(&session)?;

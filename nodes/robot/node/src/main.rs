@@ -3,12 +3,11 @@
 mod config;
 mod play;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use homing_protocol::Session;
-use homing_protocol::process;
+use homing_protocol::process::{self, ProcessArgs};
 use homing_robot::replay::{Recording, ReplayBody};
 
 use crate::config::Config;
@@ -17,13 +16,12 @@ use crate::config::Config;
 #[derive(Parser)]
 #[command(name = "homing-robot", version)]
 struct Args {
-    /// The process's TOML file; see deploy/.
-    #[arg(long)]
-    config: PathBuf,
+    #[command(flatten)]
+    process: ProcessArgs,
 }
 
 fn main() -> ExitCode {
-    process::run(&Args::parse().config, run)
+    process::run(&Args::parse().process, run)
 }
 
 #[tokio::main]
