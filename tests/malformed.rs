@@ -303,7 +303,8 @@ fn truths_that_are_none() {
         &[
             ("not finite", |m| m.path_length_m = f64::NAN),
             ("not finite", |m| m.start_yaw_rad = f64::INFINITY),
-            ("negative stamp", |m| m.header.stamp.sec = -1),
+            ("before the clock's origin", |m| m.header.stamp.sec = -1),
+            ("ns in a second", |m| m.header.stamp.nanosec = 1_000_000_000),
         ],
     );
 }

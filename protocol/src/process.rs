@@ -11,6 +11,7 @@ use nix::sys::signal::{Signal, raise};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
+use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
 use crate::session::{DEFAULT_ENDPOINT, Link, SessionConfig};
@@ -176,18 +177,17 @@ pub fn start_log() {
     let _ = log.with_ansi(std::io::stderr().is_terminal()).with_writer(std::io::stderr).try_init();
 }
 
-/// Waits for Ctrl-C or SIGTERM.
-pub async fn termination() {
-    let mut terminate = match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
-        Ok(stream) => stream,
-        Err(cause) => {
-            tracing::error!(%cause, "cannot listen for SIGTERM; Ctrl-C still works");
-            let _ = tokio::signal::ctrl_c().await;
-            return;
+/// Waits for Ctrl-C or SIGTERM. From this call on, not only from the first poll, neither ends the process by itself. Needs
+/// a tokio runtime.
+///
+/// # Errors
+/// What the system says when it refuses to hand signals over.
+pub fn termination() -> std::io::Result<impl Future<Output = ()>> {
+    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    Ok(async move {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
         }
-    };
-    tokio::select! {
-        _ = tokio::signal::ctrl_c() => {}
-        _ = terminate.recv() => {}
-    }
+    })
 }

@@ -37,7 +37,7 @@ pub async fn drive(
 ) -> anyhow::Result<Watched> {
     let client = NavigateClient::connect(session, Duration::from_secs(20)).await?;
     let mut goal = client.send(photo).await?;
-    let interrupt = homing_protocol::process::termination();
+    let interrupt = homing_protocol::process::termination()?;
     tokio::pin!(interrupt);
     let end = goal.result(MISSION_MAX);
     tokio::pin!(end);

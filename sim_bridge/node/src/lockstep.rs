@@ -25,9 +25,9 @@ pub async fn run(session: &Session, mut world: World) -> anyhow::Result<()> {
     let mut gate = CommandGate::new(GateConfig::new(limits));
     let mut last: Option<MotionResult> = None;
     let mut last_refusal: Option<Refusal> = None;
+    let stop = process::termination()?;
     world.describe();
 
-    let stop = process::termination();
     tokio::pin!(stop);
     loop {
         show(&out, &mut world)?;

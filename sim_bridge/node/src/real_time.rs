@@ -27,9 +27,9 @@ pub async fn run(session: &Session, world: World, frame_period: Duration) -> any
     let velocities = session.subscribe(&topics::CMD_VEL, 1)?;
     let mut resets = session.serve::<ResetEpisode>(RESET)?;
     let mut body = Body::new(world, out)?;
+    let stop = process::termination()?;
     body.world.describe();
 
-    let stop = process::termination();
     tokio::pin!(stop);
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);

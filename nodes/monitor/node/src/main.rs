@@ -49,9 +49,9 @@ async fn run(config: Config) -> anyhow::Result<()> {
         still.truth(PlanarPose { x_m, y_m, yaw_rad }, shortest);
     }
     let mut ears = Ears::open(&session)?;
+    let stop = process::termination()?;
     tracing::info!("the monitor is ready");
 
-    let stop = process::termination();
     tokio::pin!(stop);
     loop {
         tokio::select! {

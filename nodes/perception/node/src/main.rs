@@ -36,10 +36,10 @@ async fn run(config: Config) -> anyhow::Result<()> {
     let infos = session.subscribe(&topics::CAMERA_INFO, 2)?;
     let goals = session.subscribe(&topics::GOAL_IMAGE, 1)?;
     let estimates = session.publisher(&topics::GOAL_ESTIMATE)?;
+    let stop = process::termination()?;
     tracing::info!("perception is ready");
 
     let mut assembler = FrameAssembler::default();
-    let stop = process::termination();
     tokio::pin!(stop);
     loop {
         let answers = tokio::select! {

@@ -141,6 +141,8 @@ impl Config {
             map_side_m: self.map.side_m,
             resolution_m: self.map.resolution_m,
             step_budget: self.mission.step_budget,
+            // What is decided on an older one reaches the body expired.
+            observation_age_max: self.pace.time_to_live(),
             ..PlannerConfig::default()
         };
         config.body.radius_m = self.body.radius_m;

@@ -35,10 +35,10 @@ async fn run(config: Config) -> anyhow::Result<()> {
     let session = Session::open(&config.session.session("planner"))?;
     let links = Links::open(&session)?;
     let missions = NavigateServer::announce(&session)?;
+    let stop = process::termination()?;
     tracing::info!(policy = planner.policy(), "planner is ready");
 
     let mut driver = Driver::new(planner, config, links, missions);
-    let stop = process::termination();
     tokio::pin!(stop);
     loop {
         tokio::select! {

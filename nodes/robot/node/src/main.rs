@@ -26,13 +26,14 @@ fn main() -> ExitCode {
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
+    let stop = process::termination()?;
     let session = Session::open(&config.session.body())?;
     let recording = Recording::open(&config.recording)?;
     let frames = if config.frames.is_empty() { recording.numbers().collect() } else { config.frames };
     let body = ReplayBody::with_playlist(recording, frames)?;
     tokio::select! {
         played = play::run(&session, body, config.answers) => played?,
-        () = process::termination() => {}
+        () = stop => {}
     }
     session.close();
     Ok(())

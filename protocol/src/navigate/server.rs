@@ -1,12 +1,8 @@
-//! The action `navigate_to_image`: drive to where a photo was taken.
-//!
-//! The server stands on plain services, because a pending result request must not hold up a cancellation. A new goal
-//! takes the place of the one under way: the newest wish of the operator counts.
+//! The planner's end of the action.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use hiroz::action::client::{GoalHandle, ZActionClient, goal_state::Active};
 use hiroz::action::messages::{
     CancelGoalServiceResponse, CancelService, FeedbackMessage, GetResultResponse, GoalService, ResultService,
     SendGoalResponse, StatusMessage,
@@ -14,96 +10,19 @@ use hiroz::action::messages::{
 use hiroz::action::{GoalId, ZAction};
 use hiroz::pubsub::ZPub;
 use hiroz::{Builder, ServiceTypeInfo};
-use homing_core::Mode;
-use thiserror::Error;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinHandle;
 
-use crate::convert::{EncodedPhoto, ToDomain, ToMessage};
+use super::{ACTION, Mission, MissionId, MissionReport, NavigateError, Outcome, Progress, transport};
+use crate::convert::ToDomain;
 use crate::interfaces::homing_msgs::action::NavigateToImage;
-use crate::interfaces::homing_msgs::{NavigateToImageFeedback, NavigateToImageGoal, NavigateToImageResult};
+use crate::interfaces::homing_msgs::{NavigateToImageFeedback, NavigateToImageResult};
 use crate::session::Session;
-
-/// Name below the robot's namespace.
-pub const ACTION: &str = "navigate_to_image";
-
-/// A question that fails sooner than this was not waited for: nobody is there to answer.
-const QUICK: Duration = Duration::from_millis(500);
-/// After so many of those in a row the planner is gone.
-const REFUSALS_MAX: u32 = 6;
 
 /// ROS 2 goal status codes (action_msgs/msg/GoalStatus).
 const SUCCEEDED: i8 = 4;
 const CANCELED: i8 = 5;
 const ABORTED: i8 = 6;
-
-/// Which of the operator's wishes is meant: a goal may end while the next one is already on its way.
-#[derive(Copy, Clone, Debug, PartialEq, Eq)]
-pub struct MissionId(GoalId);
-
-/// What the planner is asked.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Mission {
-    /// Drive to this photo.
-    Start(MissionId, EncodedPhoto),
-    /// Leave it.
-    Cancel(MissionId),
-}
-
-/// How a mission ended, in the planner's own judgement.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The planner declares the goal reached.
-    Arrived,
-    /// It gave up.
-    Failed,
-    /// It was told to.
-    Cancelled,
-}
-
-/// The end of a mission.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MissionReport {
-    /// How it ended.
-    pub outcome: Outcome,
-    /// Steps taken.
-    pub steps: u64,
-    /// Way driven by odometry, metres.
-    pub path_length_m: f64,
-    /// One line for people.
-    pub message: String,
-}
-
-/// Where a mission stands.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Progress {
-    /// Steps taken.
-    pub step: u64,
-    /// Phase, as [`Mode`]'s place in homing_msgs/NavigationState.
-    pub mode: Mode,
-    /// Straight-line distance to the goal estimate, metres.
-    pub goal_distance_m: Option<f64>,
-    /// One line for people.
-    pub reason: String,
-}
-
-/// Why an action endpoint failed.
-#[derive(Debug, Error)]
-pub enum NavigateError {
-    /// hiroz or zenoh refused.
-    #[error("action {ACTION}: {0}")]
-    Transport(String),
-    /// Nobody plans.
-    #[error("no planner answers on {ACTION} within {0:?}: start one first")]
-    NoPlanner(Duration),
-    /// The planner does not want the photo.
-    #[error("the planner refused the photo")]
-    Refused,
-}
-
-fn transport(cause: impl std::fmt::Display) -> NavigateError {
-    NavigateError::Transport(cause.to_string())
-}
 
 /// The planner's end.
 pub struct NavigateServer {
@@ -349,109 +268,5 @@ impl Shared {
             Ok(end) => end.clone().unwrap_or(unknown),
             Err(_) => unknown,
         }
-    }
-}
-
-/// The operator's end.
-pub struct NavigateClient {
-    client: Arc<ZActionClient<NavigateToImage>>,
-}
-
-/// A mission that was accepted.
-pub struct NavigateGoal {
-    client: Arc<ZActionClient<NavigateToImage>>,
-    handle: GoalHandle<NavigateToImage, Active>,
-    feedback: Option<mpsc::UnboundedReceiver<NavigateToImageFeedback>>,
-}
-
-impl NavigateClient {
-    /// Waits until a planner announces the action.
-    ///
-    /// # Errors
-    /// [`NavigateError::NoPlanner`] when none does in time.
-    pub async fn connect(session: &Session, timeout: Duration) -> Result<Self, NavigateError> {
-        let client = session.node().create_action_client::<NavigateToImage>(ACTION).build().map_err(transport)?;
-        if !client.wait_for_server(timeout).await {
-            return Err(NavigateError::NoPlanner(timeout));
-        }
-        Ok(Self { client: Arc::new(client) })
-    }
-
-    /// Sends the photo.
-    ///
-    /// # Errors
-    /// [`NavigateError::Refused`] when the planner does not want it.
-    pub async fn send(&self, photo: &EncodedPhoto) -> Result<NavigateGoal, NavigateError> {
-        let goal = NavigateToImageGoal { photo: photo.to_message() };
-        let mut handle = self.client.send_goal(goal).await.map_err(|cause| {
-            tracing::debug!(%cause, "goal not accepted");
-            NavigateError::Refused
-        })?;
-        let feedback = handle.feedback();
-        Ok(NavigateGoal { client: Arc::clone(&self.client), handle, feedback })
-    }
-}
-
-impl NavigateGoal {
-    /// The next news, or `None` when there will be none. Cancel-safe.
-    pub async fn progress(&mut self) -> Option<Progress> {
-        const MODES: [Mode; 6] = [Mode::Idle, Mode::Explore, Mode::Exploit, Mode::Align, Mode::Arrived, Mode::Failed];
-        let feedback = self.feedback.as_mut()?.recv().await?;
-        Some(Progress {
-            step: feedback.step,
-            mode: MODES.get(usize::from(feedback.mode)).copied().unwrap_or(Mode::Idle),
-            goal_distance_m: feedback.goal_known.then_some(feedback.goal_distance_m),
-            reason: feedback.reason,
-        })
-    }
-
-    /// Asks the planner to leave the mission.
-    ///
-    /// # Errors
-    /// [`NavigateError::Transport`] when the planner does not answer.
-    pub async fn cancel(&self) -> Result<(), NavigateError> {
-        match self.handle.cancel().await.map_err(transport)?.return_code {
-            0 => Ok(()),
-            code => Err(transport(format!("the planner does not drive to this photo (code {code})"))),
-        }
-    }
-
-    /// Waits for the end; can be awaited beside [`NavigateGoal::progress`].
-    ///
-    /// # Errors
-    /// [`NavigateError::Transport`] when the planner is gone or the time is over.
-    pub fn result(&self, timeout: Duration) -> impl Future<Output = Result<MissionReport, NavigateError>> + use<> {
-        let (client, id) = (Arc::clone(&self.client), self.handle.id());
-        async move {
-            let asked = Instant::now();
-            let mut refusals = 0;
-            // A question lives for seconds, a mission for minutes: it is asked again until it is answered.
-            loop {
-                let began = Instant::now();
-                match client.get_result(id).await {
-                    Ok(result) => return Ok(report(&result)),
-                    Err(cause) => {
-                        refusals = if began.elapsed() < QUICK { refusals + 1 } else { 0 };
-                        if refusals >= REFUSALS_MAX || asked.elapsed() > timeout {
-                            return Err(transport(format!("the planner gives no result: {cause}")));
-                        }
-                    }
-                }
-                tokio::time::sleep(QUICK / 2).await;
-            }
-        }
-    }
-}
-
-fn report(result: &NavigateToImageResult) -> MissionReport {
-    MissionReport {
-        outcome: match result.outcome {
-            0 => Outcome::Arrived,
-            2 => Outcome::Cancelled,
-            _ => Outcome::Failed,
-        },
-        steps: result.steps,
-        path_length_m: result.path_length_m,
-        message: result.message.clone(),
     }
 }
