@@ -23,7 +23,7 @@ pub use geometry::{Rect, Side};
 pub use layout::{Axis, Door, Room, RoomKind, WALL_M};
 
 use crate::scene::Scene;
-use builder::SceneBuilder;
+use builder::{SceneBuilder, Stock};
 use furnish::{Furnishing, Span};
 use layout::Plan;
 use shell::Walls;
@@ -61,16 +61,21 @@ pub fn generate(seed: u64) -> Flat {
 /// Generates the flat of a seed in the detail asked for.
 #[must_use]
 pub fn generate_as(seed: u64, detail: Detail) -> Flat {
-    generate_variant(seed, detail, 0)
+    generate_state(seed, detail, 0, &mut Stock::new())
 }
 
-/// Generates the flat of a seed in one of its states: 0 is that of [`generate`], others have the same rooms, walls and
-/// pictures in other light, and some of their loose furniture elsewhere.
+/// Generates the flat of a seed in its first `n` states: the first is that of [`generate`], the others have the same
+/// rooms, walls and pictures in other light, and some of their loose furniture elsewhere.
 #[must_use]
-pub fn generate_variant(seed: u64, detail: Detail, variant: u32) -> Flat {
+pub fn generate_states(seed: u64, detail: Detail, n: u32) -> Vec<Flat> {
+    let stock = &mut Stock::new();
+    (0..n).map(|state| generate_state(seed, detail, state, stock)).collect()
+}
+
+fn generate_state(seed: u64, detail: Detail, state: u32, stock: &mut Stock) -> Flat {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     // Chance of its own, so that all that stays is drawn as in the flat as generated.
-    let mut change = (variant > 0).then(|| ChaCha8Rng::seed_from_u64(seed ^ (u64::from(variant) << 40)));
+    let mut change = (state > 0).then(|| ChaCha8Rng::seed_from_u64(seed ^ (u64::from(state) << 40)));
     let plan = Plan::draw(rng);
     let height_m = rng.random_range(2.5..2.7);
     let walls = shell::plan_walls(&plan, height_m, rng);
@@ -79,7 +84,7 @@ pub fn generate_variant(seed: u64, detail: Detail, variant: u32) -> Flat {
     for (room, walls) in plan.rooms.iter().zip(&walls) {
         build_room(scene, room, walls, &style, height_m, rng, change.as_mut());
     }
-    let mut scene = core::mem::take(scene).finish(format!("flat seed {seed}"), detail);
+    let mut scene = core::mem::take(scene).finish(format!("flat seed {seed}"), detail, stock);
     if let Some(change) = &mut change {
         relight::relight(&mut scene, change);
     }
@@ -160,15 +165,16 @@ mod tests {
 
     #[test]
     fn another_state_has_the_same_rooms_other_light_and_some_furniture_elsewhere() {
-        let (a, b) = (generate_as(7, Detail::Shape), generate_variant(7, Detail::Shape, 1));
+        let states = generate_states(7, Detail::Full, 3);
+        let (a, b) = (&states[0], &states[1]);
+        assert_eq!(*a, generate(7));
         assert_eq!((&a.rooms, &a.doors, a.height_m), (&b.rooms, &b.doors, b.height_m));
         assert_ne!(a.scene.lamps, b.scene.lamps);
-        assert_eq!(b, generate_variant(7, Detail::Shape, 1));
-        assert_ne!(b.scene.meshes, generate_variant(7, Detail::Shape, 2).scene.meshes);
+        assert_ne!(b.scene.meshes, states[2].scene.meshes);
         let corners = |flat: &Flat| -> std::collections::BTreeSet<[u32; 3]> {
             flat.scene.meshes.iter().flat_map(|m| &m.vertices).map(|v| v.position.map(f32::to_bits)).collect()
         };
-        let (before, after) = (corners(&a), corners(&b));
+        let (before, after) = (corners(a), corners(b));
         let kept = before.intersection(&after).count() as f64 / before.len() as f64;
         assert!((0.3..0.95).contains(&kept), "{kept} of the corners stay");
     }

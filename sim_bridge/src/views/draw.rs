@@ -11,6 +11,8 @@ use super::stage::Stage;
 use super::{FlatViews, OVERLAP_MIN, View, ViewPair, ViewSpec, ViewsError, overlap};
 use crate::scene::World;
 
+/// States of the flat, each of which shows in about as many views.
+const VARIANTS: u32 = 2;
 /// Horizontal fields of view, radians.
 const HFOV_RAD: (f64, f64) = (55.0 * PI / 180.0, 120.0 * PI / 180.0);
 /// Heights above the floor, metres.
@@ -52,7 +54,7 @@ const GROUPS_MAX: usize = 8;
 pub fn draw(seed: u64, spec: &ViewSpec) -> Result<FlatViews, ViewsError> {
     Intrinsics::from_hfov(spec.width, spec.height, HFOV_RAD.1)?;
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x7669_6577_7061_6972);
-    let stages = [Stage::new(seed, 0)?, Stage::new(seed, 1)?];
+    let stages = Stage::of_flat(seed, VARIANTS)?;
     let mut views: Vec<View> = Vec::with_capacity(spec.n_views);
     for _ in 0..GROUPS_MAX * spec.n_views {
         if views.len() >= spec.n_views {

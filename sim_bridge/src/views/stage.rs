@@ -5,7 +5,7 @@ use homing_core::{Camera, DepthImage, Intrinsics, RgbImage, Transform};
 
 use super::{View, ViewsError};
 use crate::arena::{Arena, BodySize, SceneRef};
-use crate::flat::{self, Detail};
+use crate::flat::{self, Detail, Flat};
 use crate::laser::LaserSlice;
 use crate::scene::World;
 
@@ -35,11 +35,15 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Generates the flat of a seed in one of its states.
-    pub fn new(seed: u64, variant: u32) -> Result<Self, ViewsError> {
-        let flat = flat::generate_variant(seed, Detail::Full, variant);
+    /// Generates the first `n` states of the flat of a seed.
+    pub fn of_flat(seed: u64, n: u32) -> Result<Vec<Self>, ViewsError> {
+        let states = flat::generate_states(seed, Detail::Full, n);
+        states.into_iter().zip(0..n).map(|(flat, variant)| Self::new(flat, variant)).collect()
+    }
+
+    fn new(flat: Flat, variant: u32) -> Result<Self, ViewsError> {
         let rooms = flat.rooms.iter().map(|r| r.cell).collect();
-        let arena = Arena::of_scene(SceneRef::Flat { seed }, flat.scene, rooms, ROOM_FOR_CAMERA)?;
+        let arena = Arena::of_scene(SceneRef::Flat { seed: flat.seed }, flat.scene, rooms, ROOM_FOR_CAMERA)?;
         let sight = LaserSlice::new(arena.scene(), arena.grid().floor_z_m() + SIGHT_M);
         let (space, g) = (arena.space(), arena.space().geometry());
         let free = (0..g.len()).filter(|i| space.cells()[*i]);
