@@ -17,6 +17,7 @@ pub mod scene;
 pub mod score;
 pub mod simulator;
 pub mod textures;
+pub mod views;
 
 pub use arena::{Arena, ArenaError, BodySize, SceneRef};
 pub use episode::{Episode, EpisodeSpec, Viewpoint};

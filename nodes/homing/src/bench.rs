@@ -29,7 +29,7 @@ pub struct BenchArgs {
     json: Option<PathBuf>,
 }
 
-fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
+pub fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
     let parse = || {
         let (from, to) = text.split_once("..")?;
         Some(from.trim().parse().ok()?..to.trim().parse().ok()?)

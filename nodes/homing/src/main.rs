@@ -3,6 +3,7 @@
 mod bench;
 mod demo;
 mod doctor;
+mod export_pairs;
 mod fleet;
 mod goto;
 mod latency;
@@ -38,6 +39,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Run many episodes in this process, and report success, SPL and final errors.
     Bench(bench::BenchArgs),
+    /// Write pairs of RGB-D views with exact geometry, to train features and to measure them.
+    ExportPairs(export_pairs::ExportPairsArgs),
     /// Say what is installed, which provider and GPU, ports and versions.
     Doctor(doctor::DoctorArgs),
 }
@@ -59,6 +62,7 @@ fn main() -> ExitCode {
         Command::Goto(args) => goto::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::ExportPairs(args) => export_pairs::run(args),
         Command::Doctor(args) => doctor::run(args),
     };
     match ended {

@@ -1,9 +1,11 @@
 //! Collects triangles by material, and draws the textures once all are known.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::geometry::Spot;
-use crate::scene::{Lamp, Material, Mesh, Scene, Vertex};
+use crate::scene::{Lamp, Material, Mesh, Scene, Texture, Vertex};
 use crate::textures::{self, Surface};
 
 /// How something looks: a surface drawn from a seed, tinted; or a plain colour.
@@ -73,6 +75,9 @@ pub enum Detail {
     Shape,
 }
 
+/// Textures drawn so far: the states of a flat share theirs.
+pub(super) type Stock = BTreeMap<(Surface, u64), Texture>;
+
 /// A scene under construction.
 #[derive(Default)]
 pub(super) struct SceneBuilder {
@@ -103,15 +108,17 @@ impl SceneBuilder {
         super::pen::Pen::new(self, spot)
     }
 
-    /// Draws the textures, each once and side by side, and hands the scene over.
-    pub fn finish(self, name: String, detail: Detail) -> Scene {
+    /// Draws the textures that are not in stock yet, each once and side by side, and hands the scene over.
+    pub fn finish(self, name: String, detail: Detail, stock: &mut Stock) -> Scene {
         let mut drawn: Vec<(Surface, u64)> = Vec::new();
         let mut materials: Vec<Material> = self.looks.iter().map(|look| material_of(look, &mut drawn)).collect();
         if detail == Detail::Shape {
             drawn.clear();
             materials.iter_mut().for_each(|m| m.texture = None);
         }
-        let textures = drawn.par_iter().map(|&(surface, seed)| textures::draw(surface, seed)).collect();
+        let missing: Vec<(Surface, u64)> = drawn.iter().copied().filter(|d| !stock.contains_key(d)).collect();
+        stock.par_extend(missing.par_iter().map(|&(surface, seed)| ((surface, seed), textures::draw(surface, seed))));
+        let textures = drawn.iter().filter_map(|d| stock.get(d).cloned()).collect();
         Scene { name, meshes: self.meshes, materials, textures, lamps: self.lamps }
     }
 }

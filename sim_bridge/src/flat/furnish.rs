@@ -44,6 +44,8 @@ pub(super) struct Furnishing<'a> {
 const DOOR_ZONE_M: f64 = 0.75;
 /// Attempts for each piece.
 const TRIES: usize = 30;
+/// Share of the loose pieces that stand elsewhere in another state of the room.
+const MOVED_SHARE: f64 = 0.4;
 
 impl<'a> Furnishing<'a> {
     /// An empty room with its doors.
@@ -83,6 +85,23 @@ impl<'a> Furnishing<'a> {
             RoomKind::Corridor => self.corridor(rng),
         }
         self.radiators(rng);
+    }
+
+    /// Another state of the room, with some of its loose pieces elsewhere: where each of [`Self::placed`] stands in it, or
+    /// `None` if there was no other place for it.
+    pub fn rearranged(&self, walls: &Walls, rng: &mut ChaCha8Rng) -> Vec<Option<Spot>> {
+        let moved: Vec<bool> = self.placed.iter().map(|p| p.piece.is_loose() && rng.random_bool(MOVED_SHARE)).collect();
+        let mut room = Furnishing::new(self.room, walls);
+        let both = || self.placed.iter().zip(&moved);
+        let mut spots: Vec<Option<Spot>> =
+            both().map(|(p, moved)| if *moved { None } else { room.stand(p.piece, p.spot) }).collect();
+        for (spot, (placed, _)) in spots.iter_mut().zip(both()).filter(|(_, (_, moved))| **moved) {
+            *spot = match placed.piece {
+                Piece::DiningSet(_) => room.in_the_open(placed.piece, rng),
+                piece => room.against_a_wall(piece, rng).map(|(_, spot)| spot),
+            };
+        }
+        spots
     }
 
     fn living(&mut self, rng: &mut ChaCha8Rng) {

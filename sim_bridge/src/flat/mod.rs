@@ -11,6 +11,7 @@ mod geometry;
 mod layout;
 mod passable;
 mod pen;
+mod relight;
 mod shell;
 mod style;
 
@@ -22,7 +23,7 @@ pub use geometry::{Rect, Side};
 pub use layout::{Axis, Door, Room, RoomKind, WALL_M};
 
 use crate::scene::Scene;
-use builder::SceneBuilder;
+use builder::{SceneBuilder, Stock};
 use furnish::{Furnishing, Span};
 use layout::Plan;
 use shell::Walls;
@@ -60,16 +61,33 @@ pub fn generate(seed: u64) -> Flat {
 /// Generates the flat of a seed in the detail asked for.
 #[must_use]
 pub fn generate_as(seed: u64, detail: Detail) -> Flat {
+    generate_state(seed, detail, 0, &mut Stock::new())
+}
+
+/// Generates the flat of a seed in its first `n` states: the first is that of [`generate`], the others have the same
+/// rooms, walls and pictures in other light, and some of their loose furniture elsewhere.
+#[must_use]
+pub fn generate_states(seed: u64, detail: Detail, n: u32) -> Vec<Flat> {
+    let stock = &mut Stock::new();
+    (0..n).map(|state| generate_state(seed, detail, state, stock)).collect()
+}
+
+fn generate_state(seed: u64, detail: Detail, state: u32, stock: &mut Stock) -> Flat {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    // Chance of its own, so that all that stays is drawn as in the flat as generated.
+    let mut change = (state > 0).then(|| ChaCha8Rng::seed_from_u64(seed ^ (u64::from(state) << 40)));
     let plan = Plan::draw(rng);
     let height_m = rng.random_range(2.5..2.7);
     let walls = shell::plan_walls(&plan, height_m, rng);
     let style = Style::draw(rng);
     let scene = &mut SceneBuilder::default();
     for (room, walls) in plan.rooms.iter().zip(&walls) {
-        build_room(scene, room, walls, &style, height_m, rng);
+        build_room(scene, room, walls, &style, height_m, rng, change.as_mut());
     }
-    let scene = core::mem::take(scene).finish(format!("flat seed {seed}"), detail);
+    let mut scene = core::mem::take(scene).finish(format!("flat seed {seed}"), detail, stock);
+    if let Some(change) = &mut change {
+        relight::relight(&mut scene, change);
+    }
     Flat { seed, scene, rooms: plan.rooms, doors: plan.doors, height_m }
 }
 
@@ -80,13 +98,21 @@ fn build_room(
     style: &Style,
     height_m: f64,
     rng: &mut ChaCha8Rng,
+    change: Option<&mut ChaCha8Rng>,
 ) {
     let look = &style.room(room.kind, rng);
     let mut furnishing = Furnishing::new(room, walls);
     furnishing.furnish(rng);
+    let spots = match change {
+        Some(change) => furnishing.rearranged(walls, change),
+        None => furnishing.placed.iter().map(|p| Some(p.spot)).collect(),
+    };
     shell::build_room(scene, room, walls, style, look, height_m, rng);
-    for placed in &furnishing.placed {
-        placed.piece.build(&mut scene.pen(placed.spot), style, look, rng);
+    // A piece that is gone draws its chance all the same: the next ones look as they would beside it.
+    let gone = &mut SceneBuilder::default();
+    for (placed, spot) in furnishing.placed.iter().zip(spots) {
+        let scene = if spot.is_some() { &mut *scene } else { &mut *gone };
+        placed.piece.build(&mut scene.pen(spot.unwrap_or(placed.spot)), style, look, rng);
     }
     for (spot, size) in &furnishing.rugs {
         furniture::rug(&mut scene.pen(*spot), pick(&style.rugs, rng), *size);
@@ -135,6 +161,22 @@ mod tests {
         let (a, b, c) = (generate(7), generate(7), generate(8));
         assert_eq!(a, b);
         assert_ne!(a.scene.meshes, c.scene.meshes);
+    }
+
+    #[test]
+    fn another_state_has_the_same_rooms_other_light_and_some_furniture_elsewhere() {
+        let states = generate_states(7, Detail::Full, 3);
+        let (a, b) = (&states[0], &states[1]);
+        assert_eq!(*a, generate(7));
+        assert_eq!((&a.rooms, &a.doors, a.height_m), (&b.rooms, &b.doors, b.height_m));
+        assert_ne!(a.scene.lamps, b.scene.lamps);
+        assert_ne!(b.scene.meshes, states[2].scene.meshes);
+        let corners = |flat: &Flat| -> std::collections::BTreeSet<[u32; 3]> {
+            flat.scene.meshes.iter().flat_map(|m| &m.vertices).map(|v| v.position.map(f32::to_bits)).collect()
+        };
+        let (before, after) = (corners(a), corners(b));
+        let kept = before.intersection(&after).count() as f64 / before.len() as f64;
+        assert!((0.3..0.95).contains(&kept), "{kept} of the corners stay");
     }
 
     #[test]

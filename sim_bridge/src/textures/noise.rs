@@ -18,11 +18,16 @@ pub fn random(x: i32, y: i32, seed: u32) -> f32 {
 pub fn value(x: f32, y: f32, period: (i32, i32), seed: u32) -> f32 {
     let (xi, yi) = (floor(x), floor(y));
     let (fx, fy) = (ease(x - xi as f32), ease(y - yi as f32));
-    let (x0, x1) = (xi.rem_euclid(period.0), (xi + 1).rem_euclid(period.0));
-    let (y0, y1) = (yi.rem_euclid(period.1), (yi + 1).rem_euclid(period.1));
+    let (x0, x1) = (wrapped(xi, period.0), wrapped(xi + 1, period.0));
+    let (y0, y1) = (wrapped(yi, period.1), wrapped(yi + 1, period.1));
     let top = mix(random(x0, y0, seed), random(x1, y0, seed), fx);
     let bottom = mix(random(x0, y1, seed), random(x1, y1, seed), fx);
     mix(top, bottom, fy)
+}
+
+/// Into 0..period. Nearly every point lies there already, and a division costs more than the rest.
+fn wrapped(i: i32, period: i32) -> i32 {
+    if (0..period).contains(&i) { i } else { i.rem_euclid(period) }
 }
 
 /// Octaves of [`value`] over `u, v` in 0..1, about 0..1; `cells` lattice points in the first octave.

@@ -95,6 +95,15 @@ impl Piece {
         }
     }
 
+    /// True if people move it now and then; false for what is fixed to walls and pipes.
+    pub fn is_loose(self) -> bool {
+        match self {
+            Piece::Kitchen(_) | Piece::Counter(_) | Piece::Radiator | Piece::Fridge | Piece::Washer => false,
+            Piece::Bath | Piece::Toilet | Piece::Basin => false,
+            _ => true,
+        }
+    }
+
     /// Draws it. What it is made of comes from the room; chance decides small things.
     pub fn build(self, pen: &mut Pen<'_>, style: &Style, look: &RoomStyle, rng: &mut ChaCha8Rng) {
         match self {
