@@ -24,7 +24,7 @@ class MatcherConfig:
 
     dimension: int = 64
     heads: int = 2
-    layers: int = 4
+    layers: int = 3
     # Self attention looks at this many of the strongest keypoints: keypoints come strongest first.
     anchors: int = 256
     sinkhorn_iterations: int = 5
@@ -154,14 +154,19 @@ class Matcher(nn.Module):
 
         Returns scores n x ka x kb, dustbin scores n x ka and n x kb.
         """
+        x, y, bin_a, bin_b = self.embed(points_a, descriptors_a, scores_a, points_b, descriptors_b, scores_b)
+        return (x @ y.transpose(-1, -2)).float(), bin_a, bin_b
+
+    def embed(self, points_a, descriptors_a, scores_a, points_b, descriptors_b, scores_b):
+        """The same, with the scores as factors: n x ka x 64 and n x kb x 64, whose products they are."""
         x = self._embedded(points_a, descriptors_a, scores_a)
         y = self._embedded(points_b, descriptors_b, scores_b)
         rotation_x, rotation_y = self._rotation(points_a), self._rotation(points_b)
         for own, other in zip(self.self_layers, self.cross_layers):
             x, y = own(x, rotation_x), own(y, rotation_y)
             x, y = other(x, y)
-        similarity = self.temperature() * unit(self.project(x)) @ unit(self.project(y)).transpose(-1, -2)
-        return similarity.float(), self.dustbin(x)[..., 0].float(), self.dustbin(y)[..., 0].float()
+        bins = self.dustbin(x)[..., 0].float(), self.dustbin(y)[..., 0].float()
+        return self.temperature() * unit(self.project(x)), unit(self.project(y)), *bins
 
     def _embedded(self, points: torch.Tensor, descriptors: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
         return descriptors + self.position(torch.cat([points, scores[..., None]], -1))
@@ -189,10 +194,11 @@ def log_assignment(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.T
     return scores + u[:, :, None] + v[:, None]
 
 
-def assignment(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int) -> torch.Tensor:
-    """The same transport plan by scaling vectors, without the dustbins: n x ka x kb. Many times faster, equal to rounding.
+def scaling(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int):
+    """The same plan as u * exp(scores - TEMPERATURE_MAX) * v: the three factors, n x ka x 1, n x ka x kb, n x 1 x kb.
 
-    Scores are bounded by TEMPERATURE_MAX, so their exponentials need no other protection than one common offset.
+    Products with vectors instead of logarithms of sums, many times faster. Scores are bounded by TEMPERATURE_MAX, so their
+    exponentials need no other protection than this common offset.
     """
     ka, kb = bin_a.shape[1], bin_b.shape[1]
     corner = torch.exp(0.5 * (bin_a.mean(1, keepdim=True) + bin_b.mean(1, keepdim=True)) - TEMPERATURE_MAX)[..., None]
@@ -204,15 +210,20 @@ def assignment(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tenso
         u_bin = kb / ((from_bin * v).sum(2, keepdim=True) + corner * v_bin)
         v = 1 / (u.transpose(1, 2) @ kernel + from_bin * u_bin)
         v_bin = ka / ((to_bin * u).sum(1, keepdim=True) + corner * u_bin)
-    return u * kernel * v
+    return u, kernel, v
 
 
-def mutual_matches(plan: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """For n x ka x kb masses: each keypoint's partner (n x ka, -1 without) if each is the other's best, and the mass."""
-    best, partner = plan.max(2)
-    best_of_partner = plan.amax(1).gather(1, partner)
-    mutual = best >= best_of_partner
-    return torch.where(mutual, partner, -1), torch.where(mutual, best, torch.zeros_like(best))
+def mutual_matches(x: torch.Tensor, y: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int):
+    """Each keypoint's partner (n x ka, -1 without) if each is the other's best, and the mass between them.
+
+    `x`, `y` are the factors of the scores. The best of a column is sought along rows of the transposed product: runtimes
+    search the last axis many times faster than the one before.
+    """
+    u, kernel, v = scaling(x @ y.transpose(1, 2), bin_a, bin_b, iterations)
+    best, partner = (kernel * v).max(2)
+    partner_back = (y @ x.transpose(1, 2) + torch.log(u).transpose(1, 2)).argmax(2)
+    mutual = partner_back.gather(1, partner) == torch.arange(x.shape[1], device=x.device)
+    return torch.where(mutual, partner, -1), torch.where(mutual, best * u[..., 0], torch.zeros_like(best))
 
 
 class ExportedMatcher(nn.Module):
@@ -224,8 +235,8 @@ class ExportedMatcher(nn.Module):
 
     def forward(self, keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1):
         inputs = (keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1)
-        scores = self.matcher(*(x[None] for x in inputs))
-        matches, confidences = mutual_matches(assignment(*scores, self.matcher.config.sinkhorn_iterations))
+        factors = self.matcher.embed(*(x[None] for x in inputs))
+        matches, confidences = mutual_matches(*factors, self.matcher.config.sinkhorn_iterations)
         return matches[0], confidences[0]
 
 

@@ -10,7 +10,7 @@ import torch
 from . import augment
 from .extractor import Extractor, heat_map
 from .geometry import View, Warp, transform_points
-from .matcher import Matcher, assignment, log_assignment, mutual_matches
+from .matcher import ExportedMatcher, Matcher, log_assignment, scaling
 from .matcher_loss import UNMATCHED, match_labels
 from .synthetic import write_set
 from .train_extractor import plan_from as extractor_plan
@@ -93,18 +93,19 @@ def check_sinkhorn() -> None:
     assert torch.allclose(plan[:, :, :-1].sum(1), torch.ones(2, 41), atol=1e-4)
     assert torch.allclose(plan[:, :-1].sum(2), torch.ones(2, 30), atol=1e-2)
     few = log_assignment(similarity, bin_a, bin_b, iterations=5).exp()[:, :-1, :-1]
-    assert torch.allclose(assignment(similarity, bin_a, bin_b, 5), few, atol=1e-4)
+    u, kernel, v = scaling(similarity, bin_a, bin_b, 5)
+    assert torch.allclose(u * kernel * v, few, atol=1e-4)
 
 
 def check_untrained_matcher_is_nearest_neighbour() -> None:
     """Before training, a permuted set of descriptors is matched to itself."""
-    descriptors = torch.nn.functional.normalize(torch.randn(1, 50, 64), dim=2)
-    order = torch.randperm(50)
-    points, scores = torch.rand(1, 50, 2), torch.rand(1, 50)
+    descriptors = torch.nn.functional.normalize(torch.randn(50, 64), dim=1)
+    order, points, scores = torch.randperm(50), torch.rand(50, 2), torch.rand(50)
     with torch.no_grad():
-        raw = Matcher()(points, descriptors, scores, points[:, order], descriptors[:, order], scores[:, order])
-        matches, confidences = mutual_matches(assignment(*raw, 5))
-    assert (order[matches[0]] == torch.arange(50)).all() and float(confidences.min()) > 0.5
+        matches, confidences = ExportedMatcher(Matcher())(
+            points, descriptors, scores, points[order], descriptors[order], scores[order]
+        )
+    assert (order[matches] == torch.arange(50)).all() and float(confidences.min()) > 0.5
 
 
 def check_untrained_heat_map_prefers_corners() -> None:
