@@ -9,6 +9,7 @@ Before training it matches as a dual softmax over the descriptors does: every la
 """
 
 from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
 import torch
 import torch.nn.functional as F
@@ -179,7 +180,8 @@ class Matcher(nn.Module):
 def log_assignment(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int) -> torch.Tensor:
     """Sinkhorn in log space: n x ka x kb scores and dustbins to n x (ka + 1) x (kb + 1) log assignment.
 
-    Every keypoint has mass 1, either dustbin as much as the other image has keypoints (SuperGlue eq. 9, 10).
+    Every keypoint has mass 1, either dustbin as much as the other image has keypoints (SuperGlue eq. 9, 10). This is the
+    definition; `transport` computes the same many times faster.
     """
     ka, kb = similarity.shape[1:]
     corner = 0.5 * (bin_a.mean(1) + bin_b.mean(1))
@@ -194,11 +196,20 @@ def log_assignment(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.T
     return scores + u[:, :, None] + v[:, None]
 
 
-def scaling(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int):
-    """The same plan as u * exp(scores - TEMPERATURE_MAX) * v: the three factors, n x ka x 1, n x ka x kb, n x 1 x kb.
+class Transport(NamedTuple):
+    """A plan u * kernel * v in its factors (n x ka x 1, n x ka x kb, n x 1 x kb), and the masses left in either dustbin."""
 
-    Products with vectors instead of logarithms of sums, many times faster. Scores are bounded by TEMPERATURE_MAX, so their
-    exponentials need no other protection than this common offset.
+    u: torch.Tensor
+    kernel: torch.Tensor
+    v: torch.Tensor
+    alone_a: torch.Tensor
+    alone_b: torch.Tensor
+
+
+def transport(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int) -> Transport:
+    """The plan of `log_assignment` by products with vectors instead of logarithms of sums.
+
+    Scores are bounded by TEMPERATURE_MAX, so their exponentials need no other protection than this common offset.
     """
     ka, kb = bin_a.shape[1], bin_b.shape[1]
     corner = torch.exp(0.5 * (bin_a.mean(1, keepdim=True) + bin_b.mean(1, keepdim=True)) - TEMPERATURE_MAX)[..., None]
@@ -210,7 +221,7 @@ def scaling(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, 
         u_bin = kb / ((from_bin * v).sum(2, keepdim=True) + corner * v_bin)
         v = 1 / (u.transpose(1, 2) @ kernel + from_bin * u_bin)
         v_bin = ka / ((to_bin * u).sum(1, keepdim=True) + corner * u_bin)
-    return u, kernel, v
+    return Transport(u, kernel, v, (u * to_bin * v_bin)[..., 0], (u_bin * from_bin * v)[:, 0])
 
 
 def mutual_matches(x: torch.Tensor, y: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int):
@@ -219,7 +230,7 @@ def mutual_matches(x: torch.Tensor, y: torch.Tensor, bin_a: torch.Tensor, bin_b:
     `x`, `y` are the factors of the scores. The best of a column is sought along rows of the transposed product: runtimes
     search the last axis many times faster than the one before.
     """
-    u, kernel, v = scaling(x @ y.transpose(1, 2), bin_a, bin_b, iterations)
+    u, kernel, v, _, _ = transport(x @ y.transpose(1, 2), bin_a, bin_b, iterations)
     best, partner = (kernel * v).max(2)
     partner_back = (y @ x.transpose(1, 2) + torch.log(u).transpose(1, 2)).argmax(2)
     mutual = partner_back.gather(1, partner) == torch.arange(x.shape[1], device=x.device)

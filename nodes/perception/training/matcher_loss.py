@@ -7,12 +7,15 @@ import torch
 
 from .extractor import Extractor, heat_map, keypoint_score, sample_descriptors, select_keypoints
 from .geometry import Warp
-from .matcher import Matcher, log_assignment, normalised_points
+from .matcher import Matcher, Transport, normalised_points, transport
 
 # Partners lie within MATCH_PX of the exact warp; a keypoint with none within LONELY_PX is unmatched; between, undecided.
 MATCH_PX, LONELY_PX = 2.5, 5.0
 UNMATCHED, UNDECIDED = -1, -2
 NMS_RADIUS = 2
+CONFIDENCE_MIN = 0.2
+# A probability of e^-28 counts as this: no single hopeless keypoint may rule a step.
+LEAST_MASS = 1e-12
 
 
 @dataclass
@@ -49,34 +52,38 @@ def matcher_loss(matcher: Matcher, extractor: Extractor, batch, count: int, auto
         keypoints = extract(extractor, torch.cat([batch.images_a, batch.images_b]), count)
         a, b = keypoints.slice(slice(None, n)), keypoints.slice(slice(n, None))
         scores = matcher(*a.inputs(width, height), *b.inputs(width, height))
-    log_plan = log_assignment(*scores, matcher.config.sinkhorn_iterations)
+    plan = transport(*scores, matcher.config.sinkhorn_iterations)
     labels = [
         match_labels(s.warp, pa.double().cpu().numpy(), pb.double().cpu().numpy())
         for s, pa, pb in zip(batch.samples, a.points, b.points)
     ]
-    labels_a = torch.from_numpy(np.stack([l[0] for l in labels])).to(log_plan.device)
-    labels_b = torch.from_numpy(np.stack([l[1] for l in labels])).to(log_plan.device)
-    return _negative_log_likelihood(log_plan, labels_a, labels_b)
+    labels_a = torch.from_numpy(np.stack([l[0] for l in labels])).to(plan.u.device)
+    labels_b = torch.from_numpy(np.stack([l[1] for l in labels])).to(plan.u.device)
+    return _negative_log_likelihood(plan, labels_a, labels_b)
 
 
-def _negative_log_likelihood(log_plan: torch.Tensor, labels_a: torch.Tensor, labels_b: torch.Tensor):
+def _negative_log_likelihood(plan: Transport, labels_a: torch.Tensor, labels_b: torch.Tensor):
+    """SuperGlue eq. 10, with matched and lonely keypoints weighing the same."""
     matched, alone_a, alone_b = labels_a >= 0, labels_a == UNMATCHED, labels_b == UNMATCHED
-    log_true = log_plan[:, :-1].gather(2, labels_a.clamp(min=0)[..., None])[..., 0]
+    mass = plan.u * plan.kernel * plan.v
+    log_true = torch.log(mass.gather(2, labels_a.clamp(min=0)[..., None])[..., 0].clamp(min=LEAST_MASS))
     positive = -(log_true * matched).sum() / matched.sum().clamp(min=1)
-    negative_a = -(log_plan[:, :-1, -1] * alone_a).sum() / alone_a.sum().clamp(min=1)
-    negative_b = -(log_plan[:, -1, :-1] * alone_b).sum() / alone_b.sum().clamp(min=1)
+    negative_a = -(torch.log(plan.alone_a.clamp(min=LEAST_MASS)) * alone_a).sum() / alone_a.sum().clamp(min=1)
+    negative_b = -(torch.log(plan.alone_b.clamp(min=LEAST_MASS)) * alone_b).sum() / alone_b.sum().clamp(min=1)
     loss = positive + 0.5 * (negative_a + negative_b)
-    with torch.no_grad():
-        inner = log_plan[:, :-1, :-1]
-        best, partner = inner.max(2)
-        taken = (best >= inner.amax(1).gather(1, partner)) & (best > np.log(0.2))
-        right = taken & matched & (partner == labels_a)
-        wrong = taken & (alone_a | (matched & (partner != labels_a)))
-        recall = right.sum() / matched.sum().clamp(min=1)
-        precision = right.sum() / (right.sum() + wrong.sum()).clamp(min=1)
+    recall, precision = _accuracy(mass.detach(), labels_a)
     parts = {"matched": positive, "alone": 0.5 * (negative_a + negative_b), "recall": recall, "precision": precision}
     parts["pairs"] = matched.sum() / len(labels_a)
     return loss, {name: float(value.detach()) for name, value in parts.items()}
+
+
+def _accuracy(mass: torch.Tensor, labels: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Share of true matches found, and share of judged finds that are true: mutual ones above the runtime's threshold."""
+    best, partner = mass.max(2)
+    found = (best >= mass.amax(1).gather(1, partner)) & (best > CONFIDENCE_MIN)
+    right = found & (labels >= 0) & (partner == labels)
+    wrong = found & (labels != UNDECIDED) & (partner != labels)
+    return right.sum() / (labels >= 0).sum().clamp(min=1), right.sum() / (right.sum() + wrong.sum()).clamp(min=1)
 
 
 def match_labels(warp: Warp, points_a: np.ndarray, points_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -99,6 +106,9 @@ def match_labels(warp: Warp, points_a: np.ndarray, points_b: np.ndarray) -> tupl
 def _distances(warp: Warp, points_a: np.ndarray, points_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance in b of every warped point of a to every point of b (infinite where unseen), and which fates are known."""
     targets, visible, known = warp.points(points_a)
-    distance = np.linalg.norm(targets[:, None] - points_b[None], axis=2)
+    # Whatever lies farther out is as good as infinitely far, and single precision is enough for the rest.
+    targets = np.clip(targets, -1e4, 1e4).astype(np.float32)
+    points_b = points_b.astype(np.float32)
+    distance = np.hypot(targets[:, :1] - points_b[None, :, 0], targets[:, 1:] - points_b[None, :, 1])
     distance[~visible] = np.inf
     return distance, known

@@ -10,7 +10,7 @@ import torch
 from . import augment
 from .extractor import Extractor, heat_map
 from .geometry import View, Warp, transform_points
-from .matcher import ExportedMatcher, Matcher, log_assignment, scaling
+from .matcher import ExportedMatcher, Matcher, log_assignment, transport
 from .matcher_loss import UNMATCHED, match_labels
 from .synthetic import write_set
 from .train_extractor import plan_from as extractor_plan
@@ -92,9 +92,11 @@ def check_sinkhorn() -> None:
     plan = log_assignment(similarity, bin_a, bin_b, iterations=100).exp()
     assert torch.allclose(plan[:, :, :-1].sum(1), torch.ones(2, 41), atol=1e-4)
     assert torch.allclose(plan[:, :-1].sum(2), torch.ones(2, 30), atol=1e-2)
-    few = log_assignment(similarity, bin_a, bin_b, iterations=5).exp()[:, :-1, :-1]
-    u, kernel, v = scaling(similarity, bin_a, bin_b, 5)
-    assert torch.allclose(u * kernel * v, few, atol=1e-4)
+    few = log_assignment(similarity, bin_a, bin_b, iterations=5).exp()
+    fast = transport(similarity, bin_a, bin_b, 5)
+    assert torch.allclose(fast.u * fast.kernel * fast.v, few[:, :-1, :-1], atol=1e-4)
+    assert torch.allclose(fast.alone_a, few[:, :-1, -1], atol=1e-4)
+    assert torch.allclose(fast.alone_b, few[:, -1, :-1], atol=1e-4)
 
 
 def check_untrained_matcher_is_nearest_neighbour() -> None:
