@@ -18,7 +18,7 @@ def main() -> None:
     add_options(parser, steps=4000, batch=8)
     parser.add_argument("--extractor", type=Path, required=True, help="checkpoint or snapshot of the trained extractor")
     parser.add_argument("--layers", type=int, default=MatcherConfig.layers)
-    parser.add_argument("--keypoints", type=int, nargs=2, default=(256, 448), help="least and most keypoints an image")
+    parser.add_argument("--keypoints", type=int, nargs=2, default=(192, 384), help="least and most keypoints an image")
     train(plan_from(parser.parse_args()))
 
 
