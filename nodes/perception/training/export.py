@@ -1,0 +1,200 @@
+"""Exports trained checkpoints to ONNX, checks them against PyTorch, times them, and writes the manifest.
+
+`python -m training.export --extractor RUN/checkpoint.pt [--matcher RUN/checkpoint.pt] --accuracy FILE.json --out models`
+"""
+
+import argparse
+import hashlib
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import torch
+
+from .extractor import ExportedExtractor
+from .matcher import ExportedMatcher
+from .train_matcher import load_extractor, load_matcher
+
+OPSET = 18
+LICENCE = "Apache-2.0 OR MIT"
+IMAGE_INPUTS, IMAGE_OUTPUTS = ["image"], ["heat_map", "descriptors", "reliability"]
+MATCH_INPUTS = ["keypoints0", "descriptors0", "scores0", "keypoints1", "descriptors1", "scores1"]
+MATCH_OUTPUTS = ["matches0", "confidences0"]
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--extractor", type=Path, required=True)
+    parser.add_argument("--matcher", type=Path)
+    parser.add_argument("--accuracy", type=Path, action="append", default=[], help="JSON that training.evaluate wrote")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "models")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    accuracy = {path.stem: json.loads(path.read_text()) for path in options.accuracy}
+    entries = [export_extractor(options.extractor, options.out, accuracy)]
+    if options.matcher:
+        entries.append(export_matcher(options.matcher, options.out, accuracy, entries[0]))
+    manifest = {"format": 1, "grey": "0.299 R + 0.587 G + 0.114 B, 0 to 255", "models": entries}
+    (options.out / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
+    print(f"{sum(e['bytes'] for e in entries) / 1e6:.2f} MB in {options.out}")
+
+
+def export_extractor(checkpoint: Path, out: Path, accuracy: dict) -> dict:
+    """Writes homing_extractor.onnx; returns its manifest entry."""
+    extractor, facts = load_extractor(checkpoint, torch.device("cpu"))
+    model = ExportedExtractor(extractor).eval().to(memory_format=torch.contiguous_format)
+    path = out / "homing_extractor.onnx"
+    axes = {"image": {2: "height", 3: "width"}, "heat_map": {2: "height", 3: "width"}}
+    axes |= {name: {2: "height_8", 3: "width_8"} for name in ("descriptors", "reliability")}
+    _write(model, (_image(480, 640),), path, IMAGE_INPUTS, IMAGE_OUTPUTS, axes)
+    for height, width in ((480, 640), (256, 320)):
+        _check(model, path, (_image(height, width),), IMAGE_INPUTS, tolerance=2e-3)
+    milliseconds = _time(path, (_image(480, 640),), IMAGE_INPUTS, "640x480")
+    contract = {
+        "inputs": {"image": "1 x 1 x H x W float32 grey, 0 to 255; H and W multiples of 32"},
+        "outputs": {
+            "heat_map": "1 x 1 x H x W keypoint probability",
+            "descriptors": "1 x 64 x H/8 x W/8, unit length over the channels; sample at ((x + 0.5) / 8 - 0.5), renormalise",
+            "reliability": "1 x 1 x H/8 x W/8 probability; score of a keypoint = heat_map x bilinear reliability",
+        },
+    }
+    contract["selection"] = "local maxima of the score over 5x5, at least 4 px from the border, above 0.002, strongest first"
+    return _entry("homing-extractor", "extractor", path, facts, accuracy, contract, milliseconds)
+
+
+def export_matcher(checkpoint: Path, out: Path, accuracy: dict, extractor_entry: dict) -> dict:
+    """Writes homing_matcher.onnx; returns its manifest entry, which names the extractor it belongs to."""
+    matcher, facts = load_matcher(checkpoint, torch.device("cpu"))
+    model = ExportedMatcher(matcher).eval()
+    path = out / "homing_matcher.onnx"
+    axes = {name: {0: f"count{name[-1]}"} for name in MATCH_INPUTS}
+    axes |= {name: {0: "count0"} for name in MATCH_OUTPUTS}
+    _write(model, _keypoints(512, 500), path, MATCH_INPUTS, MATCH_OUTPUTS, axes)
+    for counts in ((1024, 1024), (300, 700), (3, 1)):
+        _check(model, path, _keypoints(*counts), MATCH_INPUTS, tolerance=2e-3)
+    milliseconds = _time(path, _keypoints(1024, 1024), MATCH_INPUTS, "1024x1024")
+    contract = {
+        "inputs": {
+            "keypointsI": "N x 2 float32, (pixel - (W/2, H/2)) / (max(W, H)/2); strongest keypoint first",
+            "descriptorsI": "N x 64 float32 of the extractor, unit length",
+            "scoresI": "N float32, heat_map x reliability",
+        },
+        "outputs": {
+            "matches0": "N0 int64: index into keypoints1, -1 if the two are not each other's best",
+            "confidences0": "N0 float32, 0 to 1; keep above 0.2",
+        },
+        "at_least": "1 keypoint in either image",
+    }
+    entry = _entry("homing-matcher", "matcher", path, facts, accuracy, contract, milliseconds)
+    return entry | {"extractor": extractor_entry["name"], "extractor_sha256": extractor_entry["sha256"]}
+
+
+def _image(height: int, width: int) -> torch.Tensor:
+    """A picture with structure at several scales."""
+    rng = np.random.default_rng(1)
+    total = np.zeros((height, width), np.float32)
+    for step in (4, 16, 64):
+        coarse = rng.uniform(0, 85, (-(-height // step), -(-width // step))).astype(np.float32)
+        total += np.kron(coarse, np.ones((step, step), np.float32))[:height, :width]
+    return torch.from_numpy(total)[None, None]
+
+
+def _keypoints(count_a: int, count_b: int) -> tuple[torch.Tensor, ...]:
+    generator = torch.Generator().manual_seed(2)
+
+    def image(count: int) -> tuple[torch.Tensor, ...]:
+        points = torch.rand(count, 2, generator=generator) * 2 - 1
+        descriptors = torch.nn.functional.normalize(torch.randn(count, 64, generator=generator), dim=1)
+        return points, descriptors, torch.rand(count, generator=generator).sort(descending=True).values
+
+    return image(count_a) + image(count_b)
+
+
+def _write(model, example, path: Path, inputs: list[str], outputs: list[str], axes: dict) -> None:
+    with torch.no_grad():
+        torch.onnx.export(
+            model, example, str(path), input_names=inputs, output_names=outputs, dynamic_axes=axes,
+            opset_version=OPSET, dynamo=False, do_constant_folding=True,
+        )
+
+
+def _session(path: Path, threads: int) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+
+
+def _check(model, path: Path, inputs, names: list[str], tolerance: float) -> None:
+    """Stops unless onnxruntime and PyTorch agree. Indices may differ where two partners are equally good."""
+    with torch.no_grad():
+        expected = [e.numpy() for e in model(*inputs)]
+    actual = _session(path, 1).run(None, {n: i.numpy() for n, i in zip(names, inputs)})
+    for want, got in zip(expected, actual):
+        if want.dtype == np.int64:
+            share = float((want != got).mean())
+            if share > 0.01:
+                raise RuntimeError(f"{path.name}: {share:.1%} of the matches differ from PyTorch's")
+            continue
+        error = float(np.abs(want - got).max())
+        if not error <= tolerance and (np.abs(want - got) > tolerance).mean() > 0.001:
+            raise RuntimeError(f"{path.name}: differs from PyTorch by {error}, more than {tolerance}")
+    print(f"{path.name}: agrees with PyTorch at {[tuple(i.shape) for i in inputs][:1]}")
+
+
+def _time(path: Path, inputs, names: list[str], size: str) -> dict:
+    """Least and median milliseconds on one and two threads: far apart where the machine was busy with other work."""
+    feed = {n: i.numpy() for n, i in zip(names, inputs)}
+    found = {}
+    for threads in (1, 2):
+        session = _session(path, threads)
+        for _ in range(3):
+            session.run(None, feed)
+        times = []
+        for _ in range(31):
+            begin = time.perf_counter()
+            session.run(None, feed)
+            times.append(1e3 * (time.perf_counter() - begin))
+        least, median = round(min(times), 1), round(float(np.median(times)), 1)
+        found[f"{size}_threads_{threads}"] = {"least": least, "median": median}
+    print(f"{path.name}: milliseconds {found}")
+    return found
+
+
+def _entry(name: str, kind: str, path: Path, facts: dict, accuracy: dict, contract: dict, milliseconds: dict) -> dict:
+    data = path.read_bytes()
+    return {
+        "name": name,
+        "kind": kind,
+        "file": path.name,
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "bytes": len(data),
+        "opset": OPSET,
+        "licence": LICENCE,
+        **contract,
+        "training": {
+            "commit": _commit(),
+            "seed": facts["seed"],
+            "steps": facts["step"],
+            "pairs": facts["pairs"],
+            "minutes": round(facts["seconds"] / 60, 1),
+            **facts["facts"],
+        },
+        "milliseconds_cpu": milliseconds,
+        "accuracy": accuracy,
+    }
+
+
+def _commit() -> str:
+    """The commit of the training code, marked if it was changed since."""
+    folder = Path(__file__).parent
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+    changed = subprocess.run(["git", "status", "--porcelain", "."], cwd=folder, capture_output=True, text=True, check=True).stdout
+    return head + ("+changed" if changed.strip() else "")
+
+
+if __name__ == "__main__":
+    main()
