@@ -7,6 +7,7 @@ mod fleet;
 mod goto;
 mod latency;
 mod mission;
+mod models;
 mod photo;
 mod replay;
 mod run_folder;
@@ -39,6 +40,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Say what is installed, which provider and GPU, ports and versions.
     Doctor(doctor::DoctorArgs),
+    /// List the models that come with Homing, check them, and explain what a model of your own must take and give.
+    Models(models::ModelsArgs),
 }
 
 /// How a command ended.
@@ -59,6 +62,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => replay::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Doctor(args) => doctor::run(args),
+        Command::Models(args) => models::run(args),
     };
     match ended {
         Ok(Ended::Well) => ExitCode::SUCCESS,

@@ -2,6 +2,7 @@
 
 mod answer;
 mod config;
+mod features;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -32,7 +33,9 @@ fn main() -> ExitCode {
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    let mut answerer = Answerer::new(config.perception()).context("perception cannot start")?;
+    let choice = config.choice().context("perception cannot start")?;
+    let mut answerer = Answerer::new(config.perception(), &choice).context("perception cannot start")?;
+    tracing::info!("features: {} + {}", choice.extractor.name(), choice.matcher.name());
     let session = Session::open(&config.session.session("perception"))?;
     let colors = session.subscribe(&topics::CAMERA_COLOR, 2)?;
     let depths = session.subscribe(&topics::CAMERA_DEPTH, 2)?;

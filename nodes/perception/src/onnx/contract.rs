@@ -54,7 +54,7 @@ pub struct FoundPort {
     pub name: String,
     /// Its elements, `None` if neither of the two.
     pub element: Option<Element>,
-    /// Its shape.
+    /// Its shape; empty where even the number of sides is open.
     pub shape: Vec<Option<usize>>,
 }
 
@@ -114,7 +114,7 @@ impl Port {
             Element::F32OrI64 => found.element.is_some(),
             wanted => found.element == Some(wanted),
         };
-        element && self.shapes.iter().any(|shape| fits(shape, &found.shape))
+        element && (found.shape.is_empty() || self.shapes.iter().any(|shape| fits(shape, &found.shape)))
     }
 
     /// Whether a tensor that came out has one of the shapes.
