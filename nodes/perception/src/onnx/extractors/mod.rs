@@ -139,8 +139,11 @@ fn sides(output: &Output<'_>) -> (usize, usize) {
     }
 }
 
+/// A map's name, its sides and those it should have.
+type MapSides<'a> = (&'a str, (usize, usize), (usize, usize));
+
 /// Refuses maps that are not of the stated sizes; networks leave sizes open, so this is known only now.
-fn check_sizes(maps: &[(&str, (usize, usize), (usize, usize))]) -> Result<(), String> {
+fn check_sizes(maps: &[MapSides<'_>]) -> Result<(), String> {
     let wrong = maps.iter().find(|(_, found, wanted)| found != wanted || wanted.0 == 0 || wanted.1 == 0);
     match wrong {
         Some((name, found, wanted)) => {
