@@ -22,6 +22,9 @@ pub struct Features {
     pub descriptors: Vec<f32>,
     /// Length of one descriptor.
     pub dimension: usize,
+    /// Columns and rows of the image they were found in, pixels; 0 where unknown. Matchers that attend to where a keypoint
+    /// lies need it.
+    pub image_size_px: (u32, u32),
 }
 
 /// A pair of keypoints held to show the same point.
@@ -59,4 +62,28 @@ pub trait Matcher: Send {
     /// # Errors
     /// Only for faults of the matcher, such as descriptors of unequal length.
     fn match_features(&mut self, query: &Features, goal: &Features) -> Result<Vec<FeatureMatch>, Self::Error>;
+}
+
+impl<E: FeatureExtractor + ?Sized> FeatureExtractor for Box<E> {
+    type Error = E::Error;
+
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn extract(&mut self, image: &RgbImage) -> Result<Features, Self::Error> {
+        (**self).extract(image)
+    }
+}
+
+impl<M: Matcher + ?Sized> Matcher for Box<M> {
+    type Error = M::Error;
+
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn match_features(&mut self, query: &Features, goal: &Features) -> Result<Vec<FeatureMatch>, Self::Error> {
+        (**self).match_features(query, goal)
+    }
 }

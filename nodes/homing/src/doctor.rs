@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
-use homing_perception::load_runtime;
+use homing_perception::{find_runtime, load_runtime};
 use serde::Serialize;
 
 use crate::Ended;
@@ -81,22 +81,8 @@ fn opencv() -> Finding {
     }
 }
 
-/// ORT_DYLIB_PATH, else the library in the project's own Python environment.
-fn runtime_library() -> Option<PathBuf> {
-    if let Some(path) = std::env::var_os("ORT_DYLIB_PATH") {
-        return Some(PathBuf::from(path));
-    }
-    let environments = std::fs::read_dir(".venv/lib").ok()?;
-    let folders = environments.flatten().map(|e| e.path().join("site-packages/onnxruntime/capi"));
-    folders
-        .filter_map(|folder| std::fs::read_dir(folder).ok())
-        .flat_map(|entries| entries.flatten())
-        .map(|entry| entry.path())
-        .find(|path| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("libonnxruntime.so.")))
-}
-
 fn onnx_runtime() -> Finding {
-    let Some(library) = runtime_library() else {
+    let Some(library) = find_runtime() else {
         return finding(
             "ONNX Runtime",
             State::Absent,

@@ -8,6 +8,7 @@ mod fleet;
 mod goto;
 mod latency;
 mod mission;
+mod models;
 mod photo;
 mod replay;
 mod run_folder;
@@ -43,6 +44,8 @@ enum Command {
     ExportPairs(export_pairs::ExportPairsArgs),
     /// Say what is installed, which provider and GPU, ports and versions.
     Doctor(doctor::DoctorArgs),
+    /// List the models that come with Homing, check them, and explain what a model of your own must take and give.
+    Models(models::ModelsArgs),
 }
 
 /// How a command ended.
@@ -64,6 +67,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::run(args),
         Command::ExportPairs(args) => export_pairs::run(args),
         Command::Doctor(args) => doctor::run(args),
+        Command::Models(args) => models::run(args),
     };
     match ended {
         Ok(Ended::Well) => ExitCode::SUCCESS,

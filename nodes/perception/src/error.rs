@@ -59,6 +59,15 @@ pub enum PerceptionError {
     /// Numbers that belong to no camera.
     #[error(transparent)]
     Intrinsics(#[from] IntrinsicsError),
+    /// A model cannot be used, or failed.
+    #[error(transparent)]
+    Model(#[from] crate::onnx::ModelError),
+    /// A choice of models that cannot work.
+    #[error(transparent)]
+    Choice(#[from] crate::onnx::ChoiceError),
+    /// ONNX Runtime cannot be used.
+    #[error(transparent)]
+    Runtime(#[from] crate::RuntimeError),
     /// An extractor or matcher failed.
     #[error("{name} failed: {source}")]
     Stage {

@@ -1,8 +1,11 @@
 //! ONNX Runtime: loading it, and saying plainly what it can run on.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
-use ort::ep::{CPU, CUDA, ExecutionProvider};
+use ort::environment::Environment;
+use ort::ep::{CPU, CUDA, ExecutionProvider, TensorRT};
+use ort::logging::LogLevel;
 use thiserror::Error;
 
 /// What `doctor` says about ONNX Runtime.
@@ -22,6 +25,9 @@ pub struct RuntimeReport {
 /// Why ONNX Runtime cannot be used.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
+    /// None is named and none is in the usual places.
+    #[error("ONNX Runtime was not found: install 1.{minimum} or later (the PyPI wheel `onnxruntime`) and name its libonnxruntime.so in [runtime] library, or set ORT_DYLIB_PATH", minimum = ort::MINOR_VERSION)]
+    NotFound,
     /// There is no such file.
     #[error("{} does not exist: install ONNX Runtime 1.{minimum} or later (the PyPI wheel `onnxruntime` holds libonnxruntime.so) and give its path", path.display(), minimum = ort::MINOR_VERSION)]
     Missing {
@@ -36,6 +42,59 @@ pub enum RuntimeError {
         /// The loader's words.
         reason: String,
     },
+}
+
+/// ONNX Runtime, loaded. There is one for the life of the process: the library can be neither loaded nor set up twice.
+pub struct Runtime {
+    environment: Environment,
+    report: RuntimeReport,
+}
+
+impl Runtime {
+    /// Loads ONNX Runtime from a library file the first time; later calls give the same one, whatever the file.
+    ///
+    /// # Errors
+    /// [`RuntimeError`] if the file is missing, not ONNX Runtime, or too old.
+    pub fn load(library: &Path) -> Result<&'static Self, RuntimeError> {
+        static LOADED: OnceLock<Runtime> = OnceLock::new();
+        static LOADING: Mutex<()> = Mutex::new(());
+        let _alone = LOADING.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(runtime) = LOADED.get() {
+            return Ok(runtime);
+        }
+        let report = load_runtime(library)?;
+        let unusable = |reason: String| RuntimeError::Unusable { path: report.library.clone(), reason };
+        let builder = ort::init_from(&report.library).map_err(|e| unusable(e.to_string()))?;
+        let environment = builder.with_name("homing").build().map_err(|e| unusable(e.to_string()))?;
+        environment.set_log_level(LogLevel::Warning);
+        tracing::info!(library = %report.library.display(), "ONNX Runtime {}", report.version);
+        Ok(LOADED.get_or_init(|| Self { environment, report }))
+    }
+
+    /// What was loaded.
+    #[must_use]
+    pub fn report(&self) -> &RuntimeReport {
+        &self.report
+    }
+
+    pub(crate) fn environment(&self) -> &Environment {
+        &self.environment
+    }
+}
+
+/// Where ONNX Runtime is: the file that ORT_DYLIB_PATH names, else the one in the project's own Python environment.
+#[must_use]
+pub fn find_runtime() -> Option<PathBuf> {
+    if let Some(path) = std::env::var_os("ORT_DYLIB_PATH") {
+        return Some(PathBuf::from(path));
+    }
+    let environments = std::fs::read_dir(".venv/lib").ok()?;
+    let folders = environments.flatten().map(|e| e.path().join("site-packages/onnxruntime/capi"));
+    folders
+        .filter_map(|folder| std::fs::read_dir(folder).ok())
+        .flat_map(|entries| entries.flatten())
+        .map(|entry| entry.path())
+        .find(|path| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("libonnxruntime.so.")))
 }
 
 /// Loads ONNX Runtime from a library file, and reports its build and execution providers.
@@ -58,7 +117,11 @@ pub fn load_runtime(library: &Path) -> Result<RuntimeReport, RuntimeError> {
         library: absolute.clone(),
         version: format!("1.{minor}"),
         build: ort::info().to_owned(),
-        providers: vec![("CUDA", available(CUDA::is_available())?), ("CPU", available(CPU::is_available())?)],
+        providers: vec![
+            ("TensorRT", available(TensorRT::is_available())?),
+            ("CUDA", available(CUDA::is_available())?),
+            ("CPU", available(CPU::is_available())?),
+        ],
     })
 }
 

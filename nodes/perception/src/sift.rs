@@ -53,7 +53,8 @@ impl Sift {
         let mut descriptors = Mat::default();
         if longer <= self.config.side_max_px {
             self.sift.detect_and_compute_def(&full, &no_array(), &mut keypoints, &mut descriptors)?;
-            return collect(&keypoints, &descriptors, (1.0, 1.0), self.config.keypoints_max);
+            let found = collect(&keypoints, &descriptors, (1.0, 1.0), self.config.keypoints_max)?;
+            return Ok(Features { image_size_px: (image.width(), image.height()), ..found });
         }
         let shrink = |side: u32| {
             let scaled = f64::from(side) * f64::from(self.config.side_max_px) / f64::from(longer);
@@ -64,7 +65,8 @@ impl Sift {
         imgproc::resize(&full, &mut small, size, 0.0, 0.0, imgproc::INTER_AREA)?;
         self.sift.detect_and_compute_def(&small, &no_array(), &mut keypoints, &mut descriptors)?;
         let scale = (image.width() as f32 / size.width as f32, image.height() as f32 / size.height as f32);
-        collect(&keypoints, &descriptors, scale, self.config.keypoints_max)
+        let found = collect(&keypoints, &descriptors, scale, self.config.keypoints_max)?;
+        Ok(Features { image_size_px: (image.width(), image.height()), ..found })
     }
 }
 

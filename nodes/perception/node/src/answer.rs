@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use homing_core::{GoalEstimate, GoalPhoto, RgbdFrame, Sighting, StageTimes, Stamp, UnseenReason};
-use homing_perception::{FieldOfView, GoalEstimator, PerceptionConfig, PerceptionError, decode_photo};
+use homing_perception::onnx::FeatureChoice;
+use homing_perception::{FieldOfView, PerceptionConfig, PerceptionError, ResilientEstimator, decode_photo};
 use homing_protocol::convert::EncodedPhoto;
 
 /// Holds the estimator, the last frame and what was said about it.
 pub struct Answerer {
-    estimator: GoalEstimator,
+    estimator: ResilientEstimator,
     goal_id: Option<u64>,
     last: Option<(RgbdFrame, GoalEstimate)>,
 }
@@ -18,8 +19,8 @@ pub struct Answerer {
 const CLOCK_RESTART: Duration = Duration::from_millis(500);
 
 impl Answerer {
-    pub fn new(config: PerceptionConfig) -> Result<Self, PerceptionError> {
-        Ok(Self { estimator: GoalEstimator::new(config)?, goal_id: None, last: None })
+    pub fn new(config: PerceptionConfig, choice: &FeatureChoice) -> Result<Self, PerceptionError> {
+        Ok(Self { estimator: ResilientEstimator::open(config, choice)?, goal_id: None, last: None })
     }
 
     /// A goal photo arrived. The same one again changes nothing; a new one is looked for in the last frame at once.

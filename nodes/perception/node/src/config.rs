@@ -1,8 +1,11 @@
 //! The process's TOML file.
 
 use homing_perception::PerceptionConfig;
+use homing_perception::onnx::{ChoiceError, FeatureChoice};
 use homing_protocol::process::SessionSettings;
 use serde::Deserialize;
+
+use crate::features::{FeatureSettings, MatcherSettings, RuntimeSettings, choice};
 
 /// `perception.toml`.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -10,22 +13,16 @@ use serde::Deserialize;
 pub struct Config {
     /// Network.
     pub session: SessionSettings,
-    /// Features and matching.
+    /// What finds keypoints.
     pub features: FeatureSettings,
+    /// What pairs them.
+    pub matcher: MatcherSettings,
+    /// Where models run.
+    pub runtime: RuntimeSettings,
     /// When a goal counts as seen.
     pub gates: GateSettings,
     /// Threads OpenCV may use; 0 leaves its own choice.
     pub threads: u16,
-}
-
-/// `[features]`.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FeatureSettings {
-    /// Most keypoints per image.
-    pub keypoints_max: usize,
-    /// Largest ratio of the matcher's ratio test.
-    pub ratio_max: f32,
 }
 
 /// `[gates]`.
@@ -36,13 +33,6 @@ pub struct GateSettings {
     pub n_inliers_min: usize,
     /// Largest angular error of a verified match, degrees.
     pub error_deg_max: f64,
-}
-
-impl Default for FeatureSettings {
-    fn default() -> Self {
-        let defaults = PerceptionConfig::default();
-        Self { keypoints_max: defaults.sift.keypoints_max, ratio_max: defaults.ratio_max }
-    }
 }
 
 impl Default for GateSettings {
@@ -57,7 +47,7 @@ impl Config {
     pub fn perception(&self) -> PerceptionConfig {
         let mut config = PerceptionConfig::default();
         config.sift.keypoints_max = self.features.keypoints_max;
-        config.ratio_max = self.features.ratio_max;
+        config.ratio_max = self.matcher.ratio_max;
         config.gates.n_inliers_min = self.gates.n_inliers_min;
         // An untouched default keeps its bits: degrees would move the last one.
         if self.gates.error_deg_max != config.gates.error_rad_max.to_degrees() {
@@ -65,5 +55,10 @@ impl Config {
         }
         config.threads = (self.threads > 0).then_some(self.threads);
         config
+    }
+
+    /// The features it names.
+    pub fn choice(&self) -> Result<FeatureChoice, ChoiceError> {
+        choice(&self.features, &self.matcher, &self.runtime)
     }
 }

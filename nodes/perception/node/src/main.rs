@@ -2,6 +2,7 @@
 
 mod answer;
 mod config;
+mod features;
 
 use std::process::ExitCode;
 
@@ -29,7 +30,9 @@ fn main() -> ExitCode {
 
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
-    let mut answerer = Answerer::new(config.perception()).map_err(Unusable::new)?;
+    let choice = config.choice().map_err(Unusable::new)?;
+    let mut answerer = Answerer::new(config.perception(), &choice).map_err(Unusable::new)?;
+    tracing::info!("features: {} + {}", choice.extractor.name(), choice.matcher.name());
     let session = Session::open(&config.session.session("perception"))?;
     let colors = session.subscribe(&topics::CAMERA_COLOR, 2)?;
     let depths = session.subscribe(&topics::CAMERA_DEPTH, 2)?;
