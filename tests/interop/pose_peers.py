@@ -157,14 +157,14 @@ def errors(pose, truth):
     return np.linalg.norm(-rotation.T @ t - truth["position"]), angle
 
 
-def measure(problems, example, rounds):
+def measure(problems, peers, example, rounds):
     """Figures per estimator."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "problems.bin"
         write(problems, file)
         seconds, poses = {}, {}
         for _ in range(rounds):
-            for name, solve in PEERS.items():
+            for name, solve in peers.items():
                 results = run_peer(solve, problems)
                 seconds.setdefault(name, []).append([r[0] for r in results])
                 poses[name] = [r[1] for r in results]
@@ -189,17 +189,20 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--example", type=Path, default=ROOT / "target/debug/examples/pose_peers")
+    parser.add_argument("--peers", help="names, separated by commas, that a peer must begin with; PoseLib always runs")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     if not arguments.example.is_file():
         sys.exit(f"{arguments.example} is not there: cargo build -p homing-perception --example pose_peers")
     cv2.setNumThreads(1)
     print(f"poselib {poselib.__version__}, OpenCV {cv2.__version__}, load {os.getloadavg()[0]:.1f}")
+    wanted = tuple(arguments.peers.split(",")) if arguments.peers else ("",)
+    peers = {name: solve for name, solve in PEERS.items() if name == REFERENCE or name.startswith(wanted)}
     table = {}
     for share in SHARES:
         rng = np.random.default_rng([arguments.seed, round(100 * share)])
         problems = [problem(rng, share) for _ in range(arguments.problems)]
-        figures = table[share] = measure(problems, arguments.example, arguments.rounds)
+        figures = table[share] = measure(problems, peers, arguments.example, arguments.rounds)
         reference = figures[REFERENCE]
         print(f"\n{share:.0%} outliers{'ms':>22}{'ratio':>8}{'success':>9}{'error cm':>10}{'ratio':>7}")
         for name, f in figures.items():

@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use homing_perception::PerceptionConfig;
 use homing_perception::pnp::{
-    CameraPose, Correspondence, RansacConfig, Upright, covariance, gravity_ransac, lo_ransac, p3p, ray_sd_rad,
-    refine, up2p,
+    CameraPose, Correspondence, RansacConfig, Upright, covariance, gravity_ransac, lo_ransac, p3p, ray_sd_rad, refine,
+    up2p,
 };
 use nalgebra::{Matrix6, Point3, Rotation3, Unit, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -105,10 +105,13 @@ impl Problem {
     }
 }
 
+/// Three rays, and a point on each.
+type Sample = ([Vector3<f64>; 3], [Point3<f64>; 3]);
+
 /// Nanoseconds per call of the minimal kernels, on samples in front of random poses.
 fn kernels() -> Fallible<()> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let samples: Vec<([Vector3<f64>; 3], [Point3<f64>; 3])> = (0..10_000)
+    let samples: Vec<Sample> = (0..10_000)
         .map(|_| {
             let r = Rotation3::new(Vector3::y() * rng.random_range(-1.0..1.0));
             let p = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
@@ -119,23 +122,23 @@ fn kernels() -> Fallible<()> {
         .collect();
     let upright = Upright::from_tilts(0.0, 0.0).ok_or("which way is up?")?;
     let mut poses = Vec::with_capacity(4);
-    let mut cost = |kernel: &dyn Fn(&[Vector3<f64>; 3], &[Point3<f64>; 3], &mut Vec<CameraPose>)| {
+    let mut cost = |kernel: &dyn Fn(&Sample, &mut Vec<CameraPose>)| {
         let (mut best, mut n_poses) = (f64::INFINITY, 0);
         for _ in 0..20 {
             n_poses = 0;
             let start = Instant::now();
-            for (rays, points) in &samples {
+            for sample in &samples {
                 poses.clear();
-                kernel(black_box(rays), black_box(points), &mut poses);
+                kernel(black_box(sample), &mut poses);
                 n_poses += black_box(&poses).len();
             }
             best = best.min(start.elapsed().as_secs_f64() * 1e9 / samples.len() as f64);
         }
         (best, n_poses as f64 / samples.len() as f64)
     };
-    let (p3p_ns, p3p_poses) = cost(&|rays, points, poses| p3p(rays, points, poses));
+    let (p3p_ns, p3p_poses) = cost(&|(rays, points), poses| p3p(rays, points, poses));
     let (up2p_ns, up2p_poses) =
-        cost(&|rays, points, poses| up2p(&[rays[0], rays[1]], &[points[0], points[1]], &upright, poses));
+        cost(&|(rays, points), poses| up2p(&[rays[0], rays[1]], &[points[0], points[1]], &upright, poses));
     println!("p3p  {p3p_ns:6.1} ns, {p3p_poses:.2} poses a sample");
     println!("up2p {up2p_ns:6.1} ns, {up2p_poses:.2} poses a sample");
     Ok(())

@@ -43,9 +43,7 @@ impl LocalOptimizer {
             // A pose made from three noisy points is off by more than the noise: the first step looks further.
             let gate = if step == 0 { 4.0 * self.gate } else { self.gate };
             let Some(moved) = self.step(&best, gate) else { break };
-            let Some(better) = scorer.score(&moved, best_score) else {
-                if step == 0 { continue } else { break }
-            };
+            let Some(better) = scorer.score(&moved, best_score) else { if step == 0 { continue } else { break } };
             let gain = best_score - better;
             (best, best_score) = (moved, better);
             if gain < GAIN_MIN * best_score && step > 0 {

@@ -147,11 +147,7 @@ impl Triangle {
 fn split(conic: &Matrix3<f64>) -> Option<[Vector3<f64>; 2]> {
     let m = conic;
     // The adjugate of l m^T + m l^T is -(l x m)(l x m)^T: its diagonal is negative where the lines are real.
-    let squares = [
-        m.m23 * m.m23 - m.m22 * m.m33,
-        m.m13 * m.m13 - m.m11 * m.m33,
-        m.m12 * m.m12 - m.m11 * m.m22,
-    ];
+    let squares = [m.m23 * m.m23 - m.m22 * m.m33, m.m13 * m.m13 - m.m11 * m.m33, m.m12 * m.m12 - m.m11 * m.m22];
     let (a01, a02, a12) = (m.m13 * m.m23 - m.m12 * m.m33, m.m12 * m.m23 - m.m13 * m.m22, m.m12 * m.m13 - m.m11 * m.m23);
     let (square, column) = if squares[0] >= squares[1] && squares[0] >= squares[2] {
         (squares[0], Vector3::new(-squares[0], a01, a02))
@@ -161,22 +157,13 @@ fn split(conic: &Matrix3<f64>) -> Option<[Vector3<f64>; 2]> {
         (squares[2], Vector3::new(a02, a12, -squares[2]))
     };
     // Rounding can push a double line just below zero; a clear negative, or a NaN, means that nothing is real.
-    if !(square > -1e-12) {
+    if square.is_nan() || square < -1e-12 {
         return None;
     }
     let v = if square > 1e-18 { column / square.sqrt() } else { Vector3::zeros() };
     // conic + [v]x is 2 l m^T: a row gives m, a column gives l.
-    let rank_one = Matrix3::new(
-        m.m11,
-        m.m12 - v.z,
-        m.m13 + v.y,
-        m.m12 + v.z,
-        m.m22,
-        m.m23 - v.x,
-        m.m13 - v.y,
-        m.m23 + v.x,
-        m.m33,
-    );
+    let rank_one =
+        Matrix3::new(m.m11, m.m12 - v.z, m.m13 + v.y, m.m12 + v.z, m.m22, m.m23 - v.x, m.m13 - v.y, m.m23 + v.x, m.m33);
     let (row, column) = rank_one.iamax_full();
     Some([rank_one.row(row).transpose(), rank_one.column(column).into_owned()])
 }
@@ -193,7 +180,7 @@ fn meet(line: &Vector3<f64>, conic: &Matrix3<f64>) -> [Option<Vector3<f64>>; 2] 
     let c = conic[(k, k)] + beta * (2.0 * qik + beta * qii);
     let discriminant = b * b - a * c;
     // Rounding can push a double root just below zero; a clear negative, or a NaN, means that there is no real point.
-    if !(discriminant > -1e-12) {
+    if discriminant.is_nan() || discriminant < -1e-12 {
         return [None; 2];
     }
     let q = -(b + discriminant.max(0.0).sqrt().copysign(b));

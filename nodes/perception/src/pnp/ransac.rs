@@ -92,7 +92,7 @@ pub fn lo_ransac(
     config: &RansacConfig,
     rng: &mut impl Rng,
 ) -> Result<Consensus, NoPose> {
-    let mut search = Search::new(correspondences, config)?;
+    let mut search = Search::new(correspondences, config, rng)?;
     search.run(&ThreePoints, config.iterations_max, rng);
     search.consensus()
 }
@@ -108,7 +108,7 @@ pub fn gravity_ransac(
     config: &RansacConfig,
     rng: &mut impl Rng,
 ) -> Result<Consensus, NoPose> {
-    let mut search = Search::new(correspondences, config)?;
+    let mut search = Search::new(correspondences, config, rng)?;
     search.run(upright, config.iterations_max, rng);
     let (drawn, by_two) = (search.iterations, search.best_score());
     let found = search.consensus().is_ok();
@@ -154,7 +154,7 @@ struct Search<'a> {
     correspondences: &'a [Correspondence],
     config: RansacConfig,
     n_min: usize,
-    /// Indices of the correspondences of finite numbers.
+    /// Indices of the correspondences of finite numbers, in random order.
     usable: Vec<usize>,
     scorer: Scorer,
     local: LocalOptimizer,
@@ -164,11 +164,15 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(correspondences: &'a [Correspondence], config: &RansacConfig) -> Result<Self, NoPose> {
+    fn new(correspondences: &'a [Correspondence], config: &RansacConfig, rng: &mut impl Rng) -> Result<Self, NoPose> {
         let n_min = config.n_inliers_min.max(4);
-        let usable: Vec<usize> = (0..correspondences.len()).filter(|&i| is_usable(&correspondences[i])).collect();
+        let mut usable: Vec<usize> = (0..correspondences.len()).filter(|&i| is_usable(&correspondences[i])).collect();
         if usable.len() < n_min {
             return Err(NoPose::TooFew { n: correspondences.len(), n_usable: usable.len(), n_min });
+        }
+        // Neighbours in the image are neighbours in the list: only in random order is a part like the whole.
+        for i in (1..usable.len()).rev() {
+            usable.swap(i, rng.random_range(0..=i));
         }
         Ok(Self {
             correspondences,
@@ -190,11 +194,14 @@ impl<'a> Search<'a> {
         while drawn < needed {
             drawn += 1;
             let sample = self.draw(rng);
-            kernel.poses(sample, &mut self.candidates);
+            kernel.poses(sample.map(|at| &self.correspondences[self.usable[at]]), &mut self.candidates);
             while let Some(pose) = self.candidates.pop() {
-                let Some(score) = self.scorer.score(&pose, self.best_score()) else { continue };
+                let bound = self.best_score();
+                let Some(score) = self.scorer.score_sample(&pose, bound, &sample[..K::SIZE]) else { continue };
                 self.best = Some(self.local.optimise(pose, score, &self.scorer));
-                needed = needed.min(self.samples_needed::<K>(self.n_inliers()));
+                let n_inliers = self.n_inliers();
+                self.scorer.expect(n_inliers);
+                needed = needed.min(self.samples_needed::<K>(n_inliers));
             }
         }
         self.iterations += drawn;
@@ -223,8 +230,8 @@ impl<'a> Search<'a> {
         ((SAMPLES_FACTOR * needed).ceil() as usize).max(1)
     }
 
-    /// Three different correspondences.
-    fn draw(&self, rng: &mut impl Rng) -> [&'a Correspondence; 3] {
+    /// Three different positions in `usable`.
+    fn draw(&self, rng: &mut impl Rng) -> [usize; 3] {
         let n = self.usable.len();
         let i = rng.random_range(0..n);
         let j = (i + rng.random_range(1..n)) % n;
@@ -234,7 +241,7 @@ impl<'a> Search<'a> {
                 break k;
             }
         };
-        [i, j, k].map(|i| &self.correspondences[self.usable[i]])
+        [i, j, k]
     }
 
     fn consensus(&self) -> Result<Consensus, NoPose> {

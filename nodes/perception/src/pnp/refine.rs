@@ -161,7 +161,7 @@ fn linearise(pose: &CameraPose, correspondence: &Correspondence) -> Option<Linea
     let isotropic = correspondence.ray_sd_rad * correspondence.ray_sd_rad + across * across;
     // The inverse of isotropic I + along along^T.
     let total = isotropic * (isotropic + along[0] * along[0] + along[1] * along[1]);
-    if !(total > 0.0) {
+    if total.is_nan() || total <= 0.0 {
         return None;
     }
     let inverse_noise = [

@@ -28,10 +28,18 @@ pub(super) struct Scorer {
     centre: Vector3<f64>,
     n: usize,
     inverse_gate: f32,
+    /// Fewest that must agree, of those of the first block, of the first two, and so on.
+    n_agree_min: Vec<usize>,
 }
 
+/// Share of the correspondences that agree with a wrong pose by chance, at most.
+const CHANCE: f64 = 0.005;
+
+/// Natural logarithm of how much likelier a wrong pose must be for it to be given up: one right one in twenty is.
+const EVIDENCE: f64 = 3.0;
+
 impl Scorer {
-    /// `chosen` are indices into `correspondences`; `gate_rad` is the angle at which an error counts in full, radians.
+    /// `chosen` are indices into `correspondences`, in random order; `gate_rad` is the angle at which an error counts in full, radians.
     pub(super) fn new(correspondences: &[Correspondence], chosen: &[usize], gate_rad: f64) -> Self {
         let sum: Vector3<f64> = chosen.iter().map(|&i| correspondences[i].point.coords).sum();
         let centre = sum / chosen.len().max(1) as f64;
@@ -50,18 +58,52 @@ impl Scorer {
                 block.across[1][k][lane] = axes[(1, k)] as f32;
             }
         }
-        Self { blocks, centre, n: chosen.len(), inverse_gate: (1.0 / (gate_rad * gate_rad)) as f32 }
+        let n_agree_min = vec![0; blocks.len()];
+        Self { blocks, centre, n: chosen.len(), inverse_gate: (1.0 / (gate_rad * gate_rad)) as f32, n_agree_min }
+    }
+
+    /// From now on poses are of interest with which at least half as many as `n_inliers` agree: samples are noisy. What
+    /// [`Self::score_sample`] gives up follows from Wald's sequential probability ratio (Chum and Matas, "Optimal
+    /// Randomized RANSAC", PAMI 2008).
+    pub(super) fn expect(&mut self, n_inliers: usize) {
+        let share = (0.5 * n_inliers as f64 / self.n as f64).min(0.9);
+        if share <= 2.0 * CHANCE {
+            return;
+        }
+        let ln = nalgebra::ComplexField::ln;
+        let (miss, hit): (f64, f64) = (ln((1.0 - CHANCE) / (1.0 - share)), ln(share / CHANCE));
+        for (block, least) in self.n_agree_min.iter_mut().enumerate() {
+            let n_seen = ((block + 1) * LANES) as f64;
+            // Saturates: what is below zero becomes zero.
+            *least = ((n_seen * miss - EVIDENCE) / (miss + hit)).ceil() as usize;
+        }
     }
 
     /// Sum of squared errors in units of the gate, each cut at 1; `None` as soon as it must reach `bound`.
     pub(super) fn score(&self, pose: &CameraPose, bound: f32) -> Option<f32> {
-        let r = pose.r.map(|x| x as f32);
-        let t = (pose.r * (self.centre - pose.p)).map(|x| x as f32);
+        self.sum(pose, bound, |_, _| true)
+    }
+
+    /// The same for a pose made from a sample (positions in `chosen`); `None` also as soon as too few others agree.
+    pub(super) fn score_sample(&self, pose: &CameraPose, bound: f32, sample: &[usize]) -> Option<f32> {
+        self.sum(pose, bound, |block, n_agree| {
+            let least = self.n_agree_min[block];
+            // The sample agrees with its own pose, and does not count.
+            let own = || sample.iter().filter(|&&at| at < (block + 1) * LANES).count();
+            least == 0 || n_agree as usize >= own() + least
+        })
+    }
+
+    fn sum(&self, pose: &CameraPose, bound: f32, goes_on: impl Fn(usize, u32) -> bool) -> Option<f32> {
+        let view = View::of(pose, &self.centre, self.inverse_gate);
         let mut score = self.n as f32 - (self.blocks.len() * LANES) as f32;
-        for block in &self.blocks {
-            score += block.cost(&r, &t, self.inverse_gate);
+        let mut n_agree = 0;
+        for (at, block) in self.blocks.iter().enumerate() {
+            let (cost, agree) = view.cost(block);
+            score += cost;
+            n_agree += agree;
             // Written so that a NaN ends it, too.
-            if !(score < bound) {
+            if !(score < bound && goes_on(at, n_agree)) {
                 return None;
             }
         }
@@ -69,18 +111,43 @@ impl Scorer {
     }
 }
 
-impl Block {
-    fn cost(&self, r: &nalgebra::Matrix3<f32>, t: &Vector3<f32>, inverse_gate: f32) -> f32 {
+/// A pose in single precision.
+struct View {
+    /// Rows of the rotation, and the translation, that map points relative to the centre to the goal camera.
+    rows: [[f32; 3]; 3],
+    t: [f32; 3],
+    inverse_gate: f32,
+}
+
+impl View {
+    fn of(pose: &CameraPose, centre: &Vector3<f64>, inverse_gate: f32) -> Self {
+        let t = pose.r * (centre - pose.p);
+        let row = |k: usize| [pose.r[(k, 0)] as f32, pose.r[(k, 1)] as f32, pose.r[(k, 2)] as f32];
+        Self { rows: [row(0), row(1), row(2)], t: [t.x as f32, t.y as f32, t.z as f32], inverse_gate }
+    }
+
+    /// Sum of the costs, and how many are within the gate.
+    fn cost(&self, block: &Block) -> (f32, u32) {
+        let [r0, r1, r2] = &self.rows;
+        let [x, y, z] = &block.point;
         let mut costs = [0.0_f32; LANES];
         for lane in 0..LANES {
-            let point = [self.point[0][lane], self.point[1][lane], self.point[2][lane]];
-            let q = [0, 1, 2].map(|k| r[(k, 0)] * point[0] + r[(k, 1)] * point[1] + r[(k, 2)] * point[2] + t[k]);
+            let q = [
+                r0[0] * x[lane] + r0[1] * y[lane] + r0[2] * z[lane] + self.t[0],
+                r1[0] * x[lane] + r1[1] * y[lane] + r1[2] * z[lane] + self.t[1],
+                r2[0] * x[lane] + r2[1] * y[lane] + r2[2] * z[lane] + self.t[2],
+            ];
             let dot = |axis: &[Lanes; 3]| axis[0][lane] * q[0] + axis[1][lane] * q[1] + axis[2][lane] * q[2];
             // The squared tangent of the angle between the prediction and the seen ray.
-            let (ahead, first, second) = (dot(&self.ray), dot(&self.across[0]), dot(&self.across[1]));
-            let (square, error) = (ahead * ahead, (first * first + second * second) * inverse_gate);
+            let (ahead, first, second) = (dot(&block.ray), dot(&block.across[0]), dot(&block.across[1]));
+            let (square, error) = (ahead * ahead, (first * first + second * second) * self.inverse_gate);
             costs[lane] = if ahead > 0.0 && error < square { error / square } else { 1.0 };
         }
+        let mut n_agree = 0_u32;
+        for cost in &costs {
+            n_agree += u32::from(*cost < 1.0);
+        }
+        // By halves: the compiler adds whole registers.
         let mut width = LANES / 2;
         while width > 0 {
             for lane in 0..width {
@@ -88,7 +155,7 @@ impl Block {
             }
             width /= 2;
         }
-        costs[0]
+        (costs[0], n_agree)
     }
 }
 
