@@ -10,8 +10,15 @@ pub enum PoseSolver {
     /// Three-point kernel, local optimisation, robust refinement.
     #[default]
     LoRansac,
+    /// Two points and the known direction of up in both cameras ([`PerceptionConfig::camera_down_rad`] and
+    /// [`PerceptionConfig::goal_down_rad`]), then the same. Without one of them, or where up is not where it was said to
+    /// be: three points.
+    Gravity,
     /// OpenCV's EPnP + RANSAC, as in SLING's published code; no refinement, no guided matching.
     EpnpRansac,
+    /// The same, and the goal placed by SLING's own heading formula, which is wrong by the angle between the two cameras
+    /// ([`crate::pnp::sling_heading`]): an ablation.
+    SlingHeading,
 }
 
 /// When a goal counts as seen. All errors are angles, so that the same gates fit every camera.
@@ -67,6 +74,11 @@ pub struct PerceptionConfig {
     pub calibration_sd: f64,
     /// Pose solver.
     pub solver: PoseSolver,
+    /// How far the robot's camera looks down, radians (0: level, negative: up), from its mount. It must not be rolled.
+    /// `None` if not known.
+    pub camera_down_rad: Option<f64>,
+    /// The same of the camera that took the photo. `None` if not known.
+    pub goal_down_rad: Option<f64>,
     /// When a goal counts as seen.
     pub gates: Gates,
     /// Probability with which RANSAC finds the pose if there is one.
@@ -92,6 +104,8 @@ impl Default for PerceptionConfig {
             keypoint_sd_px: 0.7,
             calibration_sd: 0.005,
             solver: PoseSolver::default(),
+            camera_down_rad: None,
+            goal_down_rad: None,
             gates: Gates::default(),
             confidence: 0.9999,
             iterations_max: 10_000,
@@ -127,6 +141,8 @@ impl PerceptionConfig {
             ("n_bearing_min", g.n_bearing_min as f64, (6.0, 10_000.0), "6..=10000"),
             ("bearing_share_min", g.bearing_share_min, (0.0, 1.0), "0..=1"),
             ("confidence", self.confidence, (0.5, 1.0 - 1e-12), "0.5..1"),
+            ("camera_down_rad", self.camera_down_rad.unwrap_or(0.0), (-1.6, 1.6), "-1.6..=1.6 rad"),
+            ("goal_down_rad", self.goal_down_rad.unwrap_or(0.0), (-1.6, 1.6), "-1.6..=1.6 rad"),
             ("guided_rounds", f64::from(self.guided_rounds), (0.0, 10.0), "0..=10"),
             ("iterations_max", self.iterations_max as f64, (1.0, 1e7), "1..=10000000"),
         ];

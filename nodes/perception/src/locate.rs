@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use homing_core::{DepthImage, FeatureMatch, Features, Intrinsics, Sighting, UnseenReason};
+use homing_core::{DepthImage, FeatureMatch, Features, Intrinsics, Sighting, Transform, UnseenReason};
 use nalgebra::{Matrix6, Point3, Unit, Vector3, Vector6};
 use rand::Rng;
 
@@ -12,7 +12,8 @@ use crate::essential::{EssentialConfig, RayPair, bearing};
 use crate::guided::{Scene, guided_matches, similarity};
 use crate::lift::lift;
 use crate::pnp::{
-    CameraPose, Correspondence, EPNP_GATE_PX, PoseEstimate, RansacConfig, covariance, epnp_ransac, lo_ransac, refine,
+    CameraPose, Correspondence, EPNP_GATE_PX, PoseEstimate, RansacConfig, Upright, covariance, epnp_ransac,
+    gravity_ransac, lo_ransac, refine, sling_heading,
 };
 use crate::synthesis::{Seen, Thumbnail, agreement};
 
@@ -54,8 +55,9 @@ pub(crate) fn locate(
     }
     let (pairs, correspondences) = views.correspondences(&matches, config);
     let found = match config.solver {
-        PoseSolver::LoRansac => proven_pose(views, pairs.clone(), correspondences, config, rng),
+        PoseSolver::LoRansac | PoseSolver::Gravity => proven_pose(views, pairs.clone(), correspondences, config, rng),
         PoseSolver::EpnpRansac => published_pose(views, &pairs, &correspondences, config)?,
+        PoseSolver::SlingHeading => published_pose(views, &pairs, &correspondences, config)?.map(placed_by_sling),
     };
     if let Some(found) = found {
         return Ok(found);
@@ -230,6 +232,15 @@ fn published_pose(
     Ok(estimate.map(|estimate| found_pose(pairs, &estimate)))
 }
 
+/// The same finding with the goal where SLING's heading formula puts it.
+fn placed_by_sling(found: Found) -> Found {
+    let Sighting::Pose { t_camera_goal, covariance, n_inliers, rms_rad } = found.sighting else { return found };
+    let r = t_camera_goal.rotation().to_rotation_matrix().into_inner();
+    let place = sling_heading(&CameraPose { r: r.transpose(), p: t_camera_goal.translation() });
+    let t_camera_goal = Transform::from_rotation(&r, place.position_m());
+    Found { sighting: Sighting::Pose { t_camera_goal, covariance, n_inliers, rms_rad }, ..found }
+}
+
 /// Pose from 2D-3D correspondences (SLING eq. 2).
 fn robust_pose(
     correspondences: &[Correspondence],
@@ -242,7 +253,15 @@ fn robust_pose(
         confidence: config.confidence,
         iterations_max: config.iterations_max,
     };
-    let consensus = lo_ransac(correspondences, &ransac, rng)?;
+    let upright = match (config.solver, config.camera_down_rad, config.goal_down_rad) {
+        (PoseSolver::Gravity, Some(camera), Some(goal)) => Upright::from_tilts(camera, goal),
+        _ => None,
+    };
+    let consensus = match &upright {
+        Some(upright) => gravity_ransac(correspondences, upright, &ransac, rng),
+        None => lo_ransac(correspondences, &ransac, rng),
+    };
+    let consensus = consensus.inspect_err(|reason| tracing::debug!(%reason, "no pose")).ok()?;
     Some(refine(&consensus.pose, correspondences, &consensus.inliers, 20))
 }
 

@@ -5,7 +5,7 @@
 use homing_perception::PerceptionConfig;
 use homing_perception::essential::{EssentialConfig, RayPair, bearing};
 use homing_perception::pnp::{
-    CameraPose, Correspondence, RansacConfig, covariance, epnp_ransac, lo_ransac, p3p, refine,
+    CameraPose, Correspondence, NoPose, RansacConfig, covariance, epnp_ransac, lo_ransac, p3p, refine,
 };
 use nalgebra::{Matrix6, Point3, Rotation3, Unit, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
@@ -138,7 +138,8 @@ fn outliers_alone_give_no_consensus() {
     for _ in 0..10 {
         let truth = goal_at(Vector3::new(0.0, 0.0, 1.0), 0.0);
         let correspondences = Room { outlier_share: 1.0, noise: 1.0, n: 60 }.correspondences(&truth, &mut rng);
-        assert_eq!(lo_ransac(&correspondences, &ransac(), &mut rng), None);
+        let found = lo_ransac(&correspondences, &ransac(), &mut rng);
+        assert!(matches!(found, Err(NoPose::NoConsensus { n_min: 12, .. })), "{found:?}");
     }
 }
 
@@ -200,7 +201,8 @@ fn too_few_or_flat_correspondences_are_survived() {
     let truth = goal_at(Vector3::new(0.3, 0.0, 0.5), 10.0);
     for n in [0, 1, 2, 3] {
         let few = Room { outlier_share: 0.0, noise: 0.0, n }.correspondences(&truth, &mut rng);
-        assert_eq!(lo_ransac(&few, &ransac(), &mut rng), None);
+        let found = lo_ransac(&few, &ransac(), &mut rng);
+        assert_eq!(found, Err(NoPose::TooFew { n, n_usable: n, n_min: 12 }));
     }
     let on = |place: &dyn Fn(f64, f64) -> Point3<f64>, rng: &mut ChaCha8Rng| -> Vec<Correspondence> {
         let mut room = Room { outlier_share: 0.0, noise: 0.0, n: 60 }.correspondences(&truth, rng);
@@ -211,7 +213,8 @@ fn too_few_or_flat_correspondences_are_survived() {
         room
     };
     let line = on(&|u, _| Point3::new(u, 0.0, 2.0), &mut rng);
-    assert_eq!(lo_ransac(&line, &ransac(), &mut rng), None, "points in line fix no pose");
+    let found = lo_ransac(&line, &ransac(), &mut rng);
+    assert!(matches!(found, Err(NoPose::Degenerate { .. })), "points in line fix no pose: {found:?}");
     let wall = on(&|u, v| Point3::new(u, v, 2.0), &mut rng);
     let consensus = lo_ransac(&wall, &ransac(), &mut rng).expect("a wall fixes the pose");
     assert!(error_of(&consensus.pose, &truth).norm() < 1e-3);

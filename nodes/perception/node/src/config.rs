@@ -1,7 +1,7 @@
 //! The process's TOML file.
 
-use homing_perception::PerceptionConfig;
 use homing_perception::onnx::{ChoiceError, FeatureChoice};
+use homing_perception::{PerceptionConfig, PoseSolver};
 use homing_protocol::process::SessionSettings;
 use serde::Deserialize;
 
@@ -21,6 +21,8 @@ pub struct Config {
     pub runtime: RuntimeSettings,
     /// When a goal counts as seen.
     pub gates: GateSettings,
+    /// From matches to a pose.
+    pub pose: PoseSettings,
     /// Threads OpenCV may use; 0 leaves its own choice.
     pub threads: u16,
 }
@@ -35,6 +37,43 @@ pub struct GateSettings {
     pub error_deg_max: f64,
 }
 
+/// `[pose]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PoseSettings {
+    /// Which solver.
+    pub solver: SolverName,
+    /// How far the robot's camera looks down, degrees; absent if not known. For `gravity`.
+    pub camera_down_deg: Option<f64>,
+    /// The same of the camera that takes the photos.
+    pub goal_down_deg: Option<f64>,
+}
+
+/// The solvers' names in the file.
+#[derive(Copy, Clone, Debug, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverName {
+    /// Three points.
+    #[default]
+    LoRansac,
+    /// Two points and up.
+    Gravity,
+    /// The papers' method.
+    EpnpRansac,
+    /// The same with SLING's heading formula.
+    SlingHeading,
+}
+
+impl From<SolverName> for PoseSolver {
+    fn from(name: SolverName) -> Self {
+        match name {
+            SolverName::LoRansac => Self::LoRansac,
+            SolverName::Gravity => Self::Gravity,
+            SolverName::EpnpRansac => Self::EpnpRansac,
+            SolverName::SlingHeading => Self::SlingHeading,
+        }
+    }
+}
 impl Default for GateSettings {
     fn default() -> Self {
         let gates = PerceptionConfig::default().gates;
@@ -53,6 +92,9 @@ impl Config {
         if self.gates.error_deg_max != config.gates.error_rad_max.to_degrees() {
             config.gates.error_rad_max = self.gates.error_deg_max.to_radians();
         }
+        config.solver = self.pose.solver.into();
+        config.camera_down_rad = self.pose.camera_down_deg.map(f64::to_radians);
+        config.goal_down_rad = self.pose.goal_down_deg.map(f64::to_radians);
         config.threads = (self.threads > 0).then_some(self.threads);
         config
     }

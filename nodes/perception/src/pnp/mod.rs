@@ -2,17 +2,23 @@
 //! (SLING eq. 2), with angular errors throughout, so that one gate fits every focal length and field of view.
 
 mod epnp;
+mod heading;
+mod local;
 mod p3p;
 mod ransac;
 mod refine;
+mod scorer;
+mod up2p;
 
 use homing_core::{Camera, Goal, Transform};
 use nalgebra::{Matrix3, Matrix6, Point3, Rotation3, Unit, Vector3};
 
 pub use epnp::{EPNP_CONFIDENCE, EPNP_GATE_PX, EPNP_ITERATIONS, epnp_ransac};
+pub use heading::{SlingHeading, sling_heading};
 pub use p3p::p3p;
-pub use ransac::{Consensus, RansacConfig, lo_ransac};
+pub use ransac::{Consensus, NoPose, RansacConfig, gravity_ransac, lo_ransac};
 pub use refine::{covariance, refine};
+pub use up2p::{Upright, up2p};
 
 /// A point the robot's camera measured, and the ray along which the goal camera sees it.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -27,6 +33,15 @@ pub struct Correspondence {
     pub ray: Unit<Vector3<f64>>,
     /// One standard deviation of that ray's direction, radians.
     pub ray_sd_rad: f64,
+}
+
+/// One standard deviation of a ray's direction, radians, from that of a pixel over the focal length: towards the image's
+/// border a pixel spans a smaller angle, by the cosine squared along the radius and by the cosine across it. This is the
+/// geometric mean of the two.
+#[must_use]
+pub fn ray_sd_rad(ray: &Unit<Vector3<f64>>, sd_over_focal: f64) -> f64 {
+    let cosine = ray.z.clamp(0.0, 1.0);
+    sd_over_focal * cosine * cosine.sqrt()
 }
 
 /// Pose of the goal camera in the robot's camera, in the form that scores fastest: a point P of the robot's camera is
