@@ -74,6 +74,7 @@ impl From<SolverName> for PoseSolver {
         }
     }
 }
+
 impl Default for GateSettings {
     fn default() -> Self {
         let gates = PerceptionConfig::default().gates;
