@@ -170,7 +170,10 @@ impl SessionSettings {
 /// Log lines go to stderr; RUST_LOG overrides what is shown.
 pub fn start_log() {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
-        EnvFilter::new("info,zenoh=error,zenoh_transport=error,zenoh_shm=error,hiroz=error,re_log_types=error")
+        EnvFilter::new(
+            "info,zenoh=error,zenoh::net::routing=off,zenoh_transport=error,zenoh_shm=error,hiroz=error,re_log_types=error,\
+             re_chunk=error,re_chunk_store=error,ort=error",
+        )
     });
     // A second call in one process changes nothing.
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_target(false);
@@ -189,5 +192,6 @@ pub fn termination() -> std::io::Result<impl Future<Output = ()>> {
             _ = terminate.recv() => {}
             _ = interrupt.recv() => {}
         }
+        tracing::info!("told to stop: leaving");
     })
 }

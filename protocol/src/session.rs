@@ -91,6 +91,12 @@ pub enum SessionError {
         /// zenoh's words.
         cause: String,
     },
+    /// No address.
+    #[error("{endpoint:?} is not an endpoint: write tcp/HOST:PORT, {DEFAULT_ENDPOINT} for instance")]
+    Endpoint {
+        /// What was given.
+        endpoint: String,
+    },
     /// A setting zenoh does not take.
     #[error("session setting {key} = {value} is refused: {cause}")]
     Setting {
@@ -233,6 +239,10 @@ fn open_error(config: &SessionConfig, cause: &zenoh::Error) -> SessionError {
 
 /// Only what differs from zenoh's defaults, and why.
 fn zenoh_config(config: &SessionConfig) -> Result<Config, SessionError> {
+    let (Link::Listen(endpoints) | Link::Connect(endpoints)) = &config.link;
+    if let Some(endpoint) = endpoints.iter().find(|e| e.parse::<zenoh::config::EndPoint>().is_err()) {
+        return Err(SessionError::Endpoint { endpoint: endpoint.clone() });
+    }
     let (mode, listen, connect) = match &config.link {
         Link::Listen(endpoints) => ("router", json_list(endpoints), json_list(&[])),
         Link::Connect(endpoints) => ("client", json_list(&[]), json_list(endpoints)),

@@ -12,7 +12,9 @@ use crate::demo::Policy;
 
 /// Runs one curved episode of 3 to 10 m in the flat of each seed, and reports success, SPL and final errors.
 ///
-/// The libraries are those of the processes, called in lockstep without the network: the same decisions, faster.
+/// The libraries are those of the processes, called in lockstep without the network: the same decisions, faster. Of each
+/// episode, as it ends: won or not, steps, way driven and shortest, SPL, distance and heading left at the end; the steps at
+/// which the goal first came into view and was first found; right and wrong estimates, and steps with a wrong goal in mind.
 #[derive(Args)]
 pub struct BenchArgs {
     /// Seeds, as A..B: from A to B without B.
@@ -62,17 +64,17 @@ pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
         ProgressStyle::with_template("{bar:30} {pos}/{len} episodes  [{elapsed}, about {eta} left]  {wide_msg}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(seeds.len() as u64).with_style(style);
-    eprintln!("{}", EpisodeRow::HEADER);
+    println!("{}", EpisodeRow::HEADER);
     let reached = std::sync::atomic::AtomicUsize::new(0);
     let report = bench(&seeds, &options, &|row: &EpisodeRow| {
         let n = reached.fetch_add(usize::from(row.score.success), std::sync::atomic::Ordering::Relaxed);
         bar.inc(1);
         // Hours of work are not lost with the report: every episode is said as it ends.
-        bar.suspend(|| eprintln!("{row}"));
+        bar.suspend(|| println!("{row}"));
         bar.set_message(format!("{} reached the goal", n + usize::from(row.score.success)));
     })?;
     bar.finish_and_clear();
-    println!("{report}");
+    println!("\n{report}");
     if let Some(path) = &args.json {
         std::fs::write(path, report.to_json()?).with_context(|| format!("cannot write {}", path.display()))?;
     }

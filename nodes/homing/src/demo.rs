@@ -41,7 +41,7 @@ pub struct DemoArgs {
     #[arg(long, value_name = "PHOTO")]
     goal: Option<PathBuf>,
     /// Horizontal field of view of that photo's camera, degrees.
-    #[arg(long, requires = "goal")]
+    #[arg(long, requires = "goal", value_parser = photo::field_of_view)]
     hfov_deg: Option<f64>,
     /// How to explore while the goal has not been seen.
     #[arg(long, value_enum, default_value_t = Policy::Frontier)]
@@ -93,6 +93,9 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     };
     folder.write(if photo.file.starts_with(&[0xff, 0xd8]) { "goal.jpg" } else { "goal.png" }, &photo.file)?;
 
+    if bar.is_hidden() {
+        eprintln!("seed {}; files in {}", args.seed, crate::run_folder::shown(&folder.file("")));
+    }
     bar.set_message("starting four processes: body, perception, planner, monitor");
     let mut fleet = start(&args, &task, &folder)?;
     let session = join(&args, &mut fleet).await?;
@@ -102,7 +105,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     all_ready(&session, &mut fleet).await?;
     bar.finish_and_clear();
 
-    let bar = mission::bar(homing_sim::constants::STEPS_MAX);
+    let bar = mission::bar();
     let watched = mission::drive(&session, &photo, &bar, || {
         scorer.listen();
         stopwatch.listen();
@@ -229,6 +232,9 @@ fn start(args: &DemoArgs, task: &Task, folder: &RunFolder) -> anyhow::Result<Fle
 
 /// The rerun viewer: the project's own Python environment has one.
 fn viewer() -> anyhow::Result<PathBuf> {
+    if ["DISPLAY", "WAYLAND_DISPLAY"].iter().all(|name| std::env::var_os(name).is_none()) {
+        bail!("--view needs a display, and there is none here: leave it out, and open the recording elsewhere");
+    }
     let own = Path::new(".venv/bin/rerun");
     if own.is_file() {
         return Ok(own.canonicalize()?);

@@ -19,7 +19,7 @@ pub struct GotoArgs {
     /// PNG or JPEG.
     photo: PathBuf,
     /// Horizontal field of view of the photo's camera, degrees; default: from the file's EXIF, else 66.
-    #[arg(long)]
+    #[arg(long, value_parser = photo::field_of_view)]
     hfov_deg: Option<f64>,
     /// Where the robot listens.
     #[arg(long, default_value = DEFAULT_ENDPOINT)]
@@ -39,7 +39,7 @@ pub async fn run(args: GotoArgs) -> anyhow::Result<Ended> {
     config.namespace.clone_from(&args.namespace);
     config.connect_timeout = Duration::from_secs(5);
     let session = Session::open(&config)?;
-    let bar = mission::bar(500);
+    let bar = mission::bar();
     let watched = mission::drive(&session, &photo, &bar, || Ok(())).await;
     bar.finish_and_clear();
     session.close();

@@ -22,9 +22,9 @@ pub enum Watched {
 }
 
 /// A bar for people; nothing on a pipe.
-pub fn bar(steps: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{spinner} step {pos:>3} of at most {len}  [{elapsed}]  {wide_msg}");
-    ProgressBar::new(steps).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+pub fn bar() -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} step {pos:>3}  {elapsed_precise}  {wide_msg}");
+    ProgressBar::new_spinner().with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 /// Sends the photo and watches until the mission ends. `each` is called between news, at least every 200 ms; an error from
@@ -71,16 +71,8 @@ pub async fn drive(
 }
 
 fn words(progress: &Progress) -> String {
-    let phase = match progress.mode {
-        Mode::Idle => "waiting",
-        Mode::Explore => "exploring",
-        Mode::Exploit => "driving to the goal",
-        Mode::Align => "turning to the photo's view",
-        Mode::Arrived => "arrived",
-        Mode::Failed => "given up",
-    };
-    match progress.goal_distance_m {
-        Some(metres) => format!("{phase}, goal {metres:.1} m away: {}", progress.reason),
-        None => format!("{phase}: {}", progress.reason),
+    match (progress.mode, progress.goal_distance_m) {
+        (Mode::Exploit, Some(metres)) => format!("goal seen {metres:.1} m away: {}", progress.reason),
+        _ => progress.reason.clone(),
     }
 }

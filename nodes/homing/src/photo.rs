@@ -13,6 +13,14 @@ const FILE_MAX: u64 = 15 << 20;
 /// Field of view assumed for a photo that does not tell, degrees: a phone's main camera.
 pub const PHONE_HFOV_DEG: f64 = 66.0;
 
+/// A horizontal field of view from the command line, degrees.
+pub fn field_of_view(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(degrees) if (1.0..=170.0).contains(&degrees) => Ok(degrees),
+        _ => Err("a camera's horizontal field of view lies between 1 and 170 degrees".to_owned()),
+    }
+}
+
 /// Reads a photo. Its camera comes from `hfov_deg` if given, else from the file's EXIF, else from the default.
 pub fn read(path: &Path, hfov_deg: Option<f64>) -> anyhow::Result<EncodedPhoto> {
     let said = || format!("the photo {}", path.display());
@@ -30,7 +38,12 @@ pub fn read(path: &Path, hfov_deg: Option<f64>) -> anyhow::Result<EncodedPhoto> 
         Some(degrees) => FieldOfView::Given(degrees.to_radians()),
         None => FieldOfView::FromFileOr(PHONE_HFOV_DEG.to_radians()),
     };
-    let Photo { intrinsics, .. } = decode_photo(&file, view).with_context(said)?;
+    let Photo { intrinsics, focal_35mm, .. } = decode_photo(&file, view).with_context(said)?;
+    if hfov_deg.is_none() {
+        let degrees = intrinsics.hfov_rad().to_degrees();
+        let source = if focal_35mm.is_some() { "says the file" } else { "assumed, the file does not tell" };
+        eprintln!("the photo's camera: horizontal field of view {degrees:.0} deg ({source}); --hfov-deg corrects it");
+    }
     Ok(EncodedPhoto { id: name_of(&file), file, intrinsics })
 }
 

@@ -297,8 +297,12 @@ fn print(table: &Table) {
     };
     println!();
     println!("  frames               {} ({} with a pose; the others count as failed)", table.n, table.n_with_pose);
-    println!("  within 0.25 m, 10 deg  {:.3}", table.share_within_25cm_10deg);
-    println!("  within 0.10 m, 5 deg   {:.3}", table.share_within_10cm_5deg);
+    let of_posed = |share: f64| share * table.n as f64 / table.n_with_pose.max(1) as f64;
+    for (bounds, share) in
+        [("0.25 m, 10 deg", table.share_within_25cm_10deg), ("0.10 m, 5 deg ", table.share_within_10cm_5deg)]
+    {
+        println!("  within {bounds}  {share:.3} of all frames, {:.3} of those with a pose", of_posed(share));
+    }
     println!("  median position error  {}", median(table.median_translation_error_m, "m"));
     println!("  median rotation error  {}", median(table.median_rotation_error_deg, "deg"));
     println!(

@@ -79,13 +79,14 @@ impl Verdict {
         if let Some(ms) = &self.latency_ms_p50 {
             println!();
             println!(
-                "  frame to estimate    {:.0} ms (p50 of {} frames): extract {:.0}, match {:.0}, pose {:.0}, the rest on the way {:.0}",
+                "  frame to estimate    {:.0} ms (medians over {} estimates): extract {:.0}, match {:.0}, pose {:.0}, on the way {:.0}",
                 ms.frame_to_estimate, ms.n_frames, ms.extract, ms.matching, ms.pose, ms.transport
             );
         }
         println!();
         println!("  picture              {}", shown(&self.picture));
-        println!("  recording            {}   (look at it: rerun {})", shown(&self.recording), shown(&self.recording));
+        println!("  recording            {}", shown(&self.recording));
+        println!("                       look at it: .venv/bin/rerun {}", shown(&self.recording));
         println!("  result as JSON       {}", shown(result));
     }
 

@@ -157,13 +157,8 @@ impl EpisodeRow {
 
 impl fmt::Display for BenchReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", EpisodeRow::HEADER)?;
-        for row in &self.episodes {
-            writeln!(f, "{row}")?;
-        }
         let percent = |x: f64| 100.0 * x;
         let or_none = |x: Option<f64>| x.map_or("-".to_owned(), |v| format!("{v:.2}"));
-        writeln!(f)?;
         writeln!(
             f,
             "{:?}: success {:.1} % (95 %: {:.1} to {:.1}) of {} episodes, SPL {:.3}",
@@ -177,7 +172,7 @@ impl fmt::Display for BenchReport {
         writeln!(
             f,
             "successes, medians: {} steps, {} m and {} degrees from the goal; all episodes: {:.0} steps on average",
-            or_none(self.steps_median_success),
+            self.steps_median_success.map_or("-".to_owned(), |steps| format!("{steps:.0}")),
             or_none(self.final_distance_m_median),
             or_none(self.final_heading_error_deg_median),
             self.steps_mean
