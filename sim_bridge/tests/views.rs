@@ -22,8 +22,11 @@ fn luma(view: &View) -> Vec<f64> {
     view.rgb.to_luma().into_iter().map(f64::from).collect()
 }
 
+/// A pixel.
+type Px = (u32, u32);
+
 /// Where the points of some of `a`'s pixels are in `b`: pixel of `a`, pixel of `b`, depth expected there.
-fn projections(a: &View, b: &View) -> Vec<((u32, u32), (u32, u32), f64)> {
+fn projections(a: &View, b: &View) -> Vec<(Px, Px, f64)> {
     let t_b_a = b.t_world_camera.inverse() * a.t_world_camera;
     let mut found = Vec::new();
     for row in (0..a.camera.height()).step_by(3) {

@@ -97,11 +97,8 @@ impl Piece {
 
     /// True if people move it now and then; false for what is fixed to walls and pipes.
     pub fn is_loose(self) -> bool {
-        match self {
-            Piece::Kitchen(_) | Piece::Counter(_) | Piece::Radiator | Piece::Fridge | Piece::Washer => false,
-            Piece::Bath | Piece::Toilet | Piece::Basin => false,
-            _ => true,
-        }
+        use Piece::{Basin, Bath, Counter, Fridge, Kitchen, Radiator, Toilet, Washer};
+        !matches!(self, Kitchen(_) | Counter(_) | Radiator | Fridge | Washer | Bath | Toilet | Basin)
     }
 
     /// Draws it. What it is made of comes from the room; chance decides small things.
