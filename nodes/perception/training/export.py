@@ -62,7 +62,10 @@ def export_extractor(checkpoint: Path, out: Path, accuracy: dict) -> dict:
             "reliability": "1 x 1 x H/8 x W/8 probability; score of a keypoint = heat_map x bilinear reliability",
         },
     }
-    contract["selection"] = "local maxima of the score over 5x5, at least 4 px from the border, above 0.002, strongest first"
+    contract["selection"] = (
+        "local maxima of the score over 5x5, at least 4 px from the border, above 0.002, strongest first; "
+        "each moved to the scores' centre of gravity over 3x3"
+    )
     return _entry("homing-extractor", "extractor", path, facts, accuracy, contract, milliseconds)
 
 

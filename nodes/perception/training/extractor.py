@@ -150,7 +150,7 @@ def sample_descriptors(descriptors: torch.Tensor, points: torch.Tensor) -> torch
 def select_keypoints(score: torch.Tensor, count: int, radius: int, threshold: float) -> tuple[torch.Tensor, torch.Tensor]:
     """The `count` strongest local maxima of n x 1 x h x w scores, strongest first.
 
-    Returns pixels n x count x 2 and scores n x count; where there are fewer maxima above `threshold`, scores are 0.
+    Positions are refined to a part of a pixel. Returns pixels n x count x 2 and scores n x count; where there are fewer maxima above `threshold`, scores are 0.
     """
     side = 2 * radius + 1
     largest = F.max_pool2d(F.max_pool2d(score, (side, 1), 1, (radius, 0)), (1, side), 1, (0, radius))
@@ -159,7 +159,18 @@ def select_keypoints(score: torch.Tensor, count: int, radius: int, threshold: fl
     peaks = torch.where((score >= largest) & (score > threshold), score, 0 * score) * border
     values, flat = peaks.flatten(1).topk(count, dim=1)
     width = score.shape[3]
-    return torch.stack([flat % width, flat // width], 2).float(), values
+    pixels = torch.stack([flat % width, flat // width], 2).float()
+    return pixels + _centroid(score, flat), values
+
+
+def _centroid(score: torch.Tensor, flat: torch.Tensor) -> torch.Tensor:
+    """Offset of the scores' centre of gravity over the 3x3 about each of n x k pixels, given by flat index: n x k x 2."""
+    y, x = torch.meshgrid(torch.arange(-1, 2), torch.arange(-1, 2), indexing="ij")
+    shifts = torch.stack([x.flatten(), y.flatten()], 1).to(score.device)
+    around = flat[:, :, None] + shifts[:, 1] * score.shape[3] + shifts[:, 0]
+    scores = score.flatten(1)
+    near = scores.gather(1, around.flatten(1).clamp(0, scores.shape[1] - 1)).view(around.shape)
+    return (near[..., None] * shifts).sum(2) / near.sum(2, keepdim=True).clamp(min=1e-12)
 
 
 def keypoint_score(heat: torch.Tensor, reliability: torch.Tensor) -> torch.Tensor:

@@ -30,9 +30,9 @@ class KeypointSet:
         """As the matcher takes them."""
         return normalised_points(self.points, width, height), self.descriptors, self.scores
 
-    def slice(self, index: slice) -> "KeypointSet":
-        """Some of the images."""
-        return KeypointSet(self.points[index], self.descriptors[index], self.scores[index])
+    def part(self, side: slice, pairs: slice, count: int) -> "KeypointSet":
+        """The strongest `count` keypoints of some of the images: of one side of the pairs, some pairs."""
+        return KeypointSet(*(x[side][pairs, :count] for x in (self.points, self.descriptors, self.scores)))
 
 
 @torch.no_grad()
@@ -44,18 +44,20 @@ def extract(extractor: Extractor, images: torch.Tensor, count: int, threshold: f
     return KeypointSet(points, sample_descriptors(descriptors, points), scores)
 
 
-def matcher_loss(matcher: Matcher, extractor: Extractor, batch, count: int, autocast):
-    """Loss of a batch with `count` keypoints an image, and its parts and accuracies for the log."""
+def matcher_loss(matcher: Matcher, features: KeypointSet, batch, pairs: slice, count: int, autocast):
+    """Loss of some pairs of a batch with the `count` best keypoints an image, and its parts and accuracies for the log.
+
+    `features` holds all images a of the batch, then all images b.
+    """
     n = len(batch.samples)
     height, width = batch.images_a.shape[2:]
+    a, b = features.part(slice(None, n), pairs, count), features.part(slice(n, None), pairs, count)
     with autocast():
-        keypoints = extract(extractor, torch.cat([batch.images_a, batch.images_b]), count)
-        a, b = keypoints.slice(slice(None, n)), keypoints.slice(slice(n, None))
         scores = matcher(*a.inputs(width, height), *b.inputs(width, height))
     plan = transport(*scores, matcher.config.sinkhorn_iterations)
     labels = [
         match_labels(s.warp, pa.double().cpu().numpy(), pb.double().cpu().numpy())
-        for s, pa, pb in zip(batch.samples, a.points, b.points)
+        for s, pa, pb in zip(batch.samples[pairs], a.points, b.points)
     ]
     labels_a = torch.from_numpy(np.stack([l[0] for l in labels])).to(plan.u.device)
     labels_b = torch.from_numpy(np.stack([l[1] for l in labels])).to(plan.u.device)

@@ -143,7 +143,8 @@ def check_resume_gives_the_same_next_step(folder: Path) -> None:
     whole.folder.mkdir(exist_ok=True)
     whole._save(whole._checkpoint_path())
     options = _options(folder, "matcher")
-    options.extractor, options.layers, options.keypoints = whole._checkpoint_path(), 2, (64, 96)
+    options.extractor, options.layers = whole._checkpoint_path(), 2
+    options.keypoints, options.rounds = (64, 96), 2
     assert np.isfinite(_advanced(matcher_plan(options), 2).last["loss"])
 
 

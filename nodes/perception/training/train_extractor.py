@@ -22,11 +22,11 @@ def plan_from(options: argparse.Namespace) -> Plan:
     dataset, described = dataset_from(options, "extractor")
     model = Extractor().to(memory_format=torch.channels_last)
     facts = {"data": described, "homographies": options.homographies, "batch": options.batch, "rate": options.rate}
-    return Plan("extractor", model, _step_loss, dataset, options.rate, options, facts)
+    return Plan("extractor", model, _step_losses, dataset, options.rate, options, facts)
 
 
-def _step_loss(model, batch, _step, autocast):
-    return extractor_loss(model, batch, autocast)
+def _step_losses(model, batch, _step, autocast):
+    yield extractor_loss(model, batch, autocast)
 
 
 if __name__ == "__main__":

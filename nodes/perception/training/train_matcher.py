@@ -8,7 +8,7 @@ import torch
 
 from .extractor import Extractor
 from .matcher import Matcher, MatcherConfig
-from .matcher_loss import matcher_loss
+from .matcher_loss import extract, matcher_loss
 from .trainer import Plan, add_options, dataset_from, device_from, train
 
 
@@ -19,6 +19,7 @@ def main() -> None:
     parser.add_argument("--extractor", type=Path, required=True, help="checkpoint or snapshot of the trained extractor")
     parser.add_argument("--layers", type=int, default=MatcherConfig.layers)
     parser.add_argument("--keypoints", type=int, nargs=2, default=(192, 384), help="least and most keypoints an image")
+    parser.add_argument("--rounds", type=int, default=2, help="times that a batch's features are used")
     train(plan_from(parser.parse_args()))
 
 
@@ -33,16 +34,24 @@ def plan_from(options: argparse.Namespace) -> Plan:
         "homographies": options.homographies,
         "batch": options.batch,
         "rate": options.rate,
+        "rounds": options.rounds,
         "config": matcher.config.as_dict(),
         "extractor_step": extractor_facts["step"],
     }
 
-    def step_loss(model, batch, step, autocast):
+    def step_losses(model, batch, step, autocast):
+        rng = np.random.default_rng([options.seed, step, 1])
         low, high = options.keypoints
-        count = int(np.random.default_rng([options.seed, step, 1]).integers(low, high + 1))
-        return matcher_loss(model, extractor, batch, count, autocast)
+        with autocast():
+            features = extract(extractor, torch.cat([batch.images_a, batch.images_b]), high)
+        # Features cost more than the matcher does: each batch serves several updates, by halves, with other keypoint counts.
+        half = max(1, options.batch // 2)
+        for _ in range(options.rounds):
+            for begin in range(0, options.batch, half):
+                pairs = slice(begin, min(begin + half, options.batch))
+                yield matcher_loss(model, features, batch, pairs, int(rng.integers(low, high + 1)), autocast)
 
-    return Plan("matcher", matcher, step_loss, dataset, options.rate, options, facts)
+    return Plan("matcher", matcher, step_losses, dataset, options.rate, options, facts)
 
 
 def load_extractor(path: Path, device: torch.device) -> tuple[Extractor, dict]:

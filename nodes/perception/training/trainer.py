@@ -28,7 +28,8 @@ class Plan:
 
     name: str
     model: torch.nn.Module
-    step_loss: Callable
+    # (model, batch, step, autocast) to one or more losses with their parts; each is followed by an update of the model.
+    step_losses: Callable
     dataset: PairDataset
     rate: float
     options: argparse.Namespace
@@ -144,20 +145,27 @@ class Run:
         bar.close()
 
     def advance(self, batch) -> dict[str, float]:
-        """One step of the optimizer. A loss that is not finite is dropped and counted in the log."""
+        """One step: the batch's losses, each with an update. A loss that is not finite is dropped and counted in the log."""
         batch.images_a, batch.images_b = batch.images_a.to(self.device), batch.images_b.to(self.device)
         for group in self.optimizer.param_groups:
             group["lr"] = rate_at(self.step, self.options.steps, self.plan.rate)
         self.model.train()
-        loss, parts = self.plan.step_loss(self.model, batch, self.step, self.autocast)
+        rows = []
+        for loss, parts in self.plan.step_losses(self.model, batch, self.step, self.autocast):
+            sound = self._update(loss)
+            rows.append({"loss": float(loss.detach())} | parts | {"dropped": float(not sound)})
+        self.step += 1
+        return {name: sum(row[name] for row in rows) / len(rows) for name in rows[0]}
+
+    def _update(self, loss: torch.Tensor) -> bool:
+        """One step down the gradient, if it is finite."""
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(self.model.parameters(), CLIP_NORM)
         sound = bool(torch.isfinite(loss)) and bool(torch.isfinite(norm))
         if sound:
             self.optimizer.step()
-        self.step += 1
-        return {"loss": float(loss.detach())} | parts | {"dropped": float(not sound)}
+        return sound
 
     def _checkpoint_path(self) -> Path:
         return self.folder / "checkpoint.pt"
