@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use homing_benchmark::{EpisodeRun, run_episode};
 use homing_core::{Action, NavigationState};
-use homing_perception::PerceptionConfig;
+use homing_perception::onnx::FeatureChoice;
+use homing_perception::{AnyEstimator, PerceptionConfig};
 use homing_planner::{Frontier, PlannerConfig};
 use homing_privileged::GroundTruth;
 use homing_protocol::navigate::{MissionReport, Outcome};
@@ -46,7 +47,7 @@ fn in_process(arena: &Arc<Arena>, episode: &Episode) -> (EpisodeRun, Vec<Navigat
     let run = run_episode(
         arena,
         episode,
-        PerceptionConfig::default(),
+        AnyEstimator::open(PerceptionConfig::default(), &FeatureChoice::default()).unwrap(),
         PlannerConfig::default(),
         Box::new(Frontier::default()),
         &mut |record| states.push(record.state.clone()),

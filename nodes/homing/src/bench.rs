@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::Args;
 use homing_benchmark::{BenchOptions, EpisodeRow, bench};
+use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Ended;
@@ -23,6 +24,15 @@ pub struct BenchArgs {
     /// How to explore while the goal has not been seen.
     #[arg(long, value_enum, default_value_t = Policy::Frontier)]
     policy: Policy,
+    /// What finds keypoints: sift, or the name of a model (homing models lists them).
+    #[arg(long, default_value = "sift")]
+    extractor: String,
+    /// What pairs them: mutual-nearest, dual-softmax, or the name of a model.
+    #[arg(long, default_value = "mutual-nearest")]
+    matcher: String,
+    /// The folder with the models and their manifest.json.
+    #[arg(long, default_value = "nodes/perception/models")]
+    models: PathBuf,
     /// Episodes side by side; 0 for one per core.
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -55,7 +65,14 @@ pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
         Policy::Straight => homing_benchmark::Policy::Straight,
         Policy::Frontier => homing_benchmark::Policy::Frontier,
     };
-    let options = BenchOptions { policy, threads: args.threads, ..BenchOptions::default() };
+    let features = FeatureChoice {
+        extractor: ExtractorChoice::resolve(&ModelName::Listed(args.extractor), &args.models)?,
+        matcher: MatcherChoice::resolve(&ModelName::Listed(args.matcher), &args.models)?,
+        // Episodes side by side use the cores better than the threads of one.
+        run: RunConfig { threads: 1, ..RunConfig::default() },
+        ..FeatureChoice::default()
+    };
+    let options = BenchOptions { policy, features, threads: args.threads, ..BenchOptions::default() };
     let seeds: Vec<u64> = args.seeds.collect();
     if seeds.len() > 100_000 {
         bail!("{} episodes are more than 100000", seeds.len());

@@ -8,6 +8,19 @@ use crate::{GoalEstimator, MutualNearest, PerceptionConfig, PerceptionError, Sif
 /// An estimator with whatever features a configuration chose.
 pub type AnyEstimator = GoalEstimator<AnyExtractor, AnyMatcher>;
 
+impl AnyEstimator {
+    /// Opens what is chosen. A model that fails in flight is an error: for measurements, where nothing may be replaced by
+    /// something else in silence.
+    ///
+    /// # Errors
+    /// As [`FeatureChoice::open`] and [`GoalEstimator::with_parts`].
+    pub fn open(config: PerceptionConfig, choice: &FeatureChoice) -> Result<Self, PerceptionError> {
+        config.check()?;
+        let Parts { extractor, matcher } = choice.open(&config)?;
+        Self::with_parts(config, extractor, matcher)
+    }
+}
+
 /// An estimator that a lost provider does not stop.
 ///
 /// The models themselves give way first: a matcher to fewer keypoints, then both to the CPU. What fails after that fails for

@@ -11,7 +11,8 @@ use std::sync::Arc;
 use homing_benchmark::cause::{is_in_view, right_pose, sighted_pose};
 use homing_benchmark::{Policy, StepRecord, run_episode};
 use homing_core::{Cell, Mode, OccupancyGrid, PlanarPose, Sighting};
-use homing_perception::{PerceptionConfig, SiftConfig};
+use homing_perception::onnx::FeatureChoice;
+use homing_perception::{AnyEstimator, PerceptionConfig, SiftConfig};
 use homing_planner::PlannerConfig;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{self, Episode, EpisodeSpec};
@@ -42,9 +43,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let nothing = SiftConfig { keypoints_max: 8, side_max_px: 64, ..SiftConfig::default() };
     let sift = if has("blind") { nothing } else { SiftConfig::default() };
     let perception = PerceptionConfig { sift, ..PerceptionConfig::default() };
+    let estimator = AnyEstimator::open(perception, &FeatureChoice::default())?;
     let mut marks = Vec::new();
     let mut map = None;
-    let run = run_episode(&arena, &episode, perception, PlannerConfig::default(), policy.build(), &mut |r| {
+    let run = run_episode(&arena, &episode, estimator, PlannerConfig::default(), policy.build(), &mut |r| {
         print_step(&arena, &episode, r);
         let sighted = sighted_pose(r).zip(right_pose(r));
         if has("frames") || (has("wrong") && sighted.is_some_and(|(_, right)| !right)) {

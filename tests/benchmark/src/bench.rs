@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use homing_core::GoalDiscovery;
-use homing_perception::PerceptionConfig;
+use homing_perception::onnx::FeatureChoice;
+use homing_perception::{AnyEstimator, PerceptionConfig};
 use homing_planner::{Frontier, PlannerConfig, Straight};
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{self, EpisodeSpec};
@@ -45,6 +46,8 @@ pub struct BenchOptions {
     pub spec: EpisodeSpec,
     /// Episodes at a time; 0 for one per core.
     pub threads: usize,
+    /// What finds keypoints, and what pairs them.
+    pub features: FeatureChoice,
     /// Perception's settings. OpenCV gets one thread per episode, whatever they say.
     pub perception: PerceptionConfig,
     /// The planner's settings.
@@ -58,6 +61,7 @@ impl Default for BenchOptions {
             policy: Policy::default(),
             spec: EpisodeSpec::default(),
             threads: 0,
+            features: FeatureChoice::default(),
             perception: PerceptionConfig::default(),
             planner: PlannerConfig::default(),
         }
@@ -107,10 +111,11 @@ fn run_seed(seed: u64, options: &BenchOptions) -> Result<(EpisodeRow, StageSecon
     let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
     let episode = episode::draw(&arena, seed, &options.spec)?;
     let mut watch = Watch::default();
+    let perception = PerceptionConfig { threads: Some(1), ..options.perception };
     let run = run_episode(
         &arena,
         &episode,
-        PerceptionConfig { threads: Some(1), ..options.perception },
+        AnyEstimator::open(perception, &options.features)?,
         options.planner.clone(),
         options.policy.build(),
         &mut |record| watch.see(&arena, &episode, record),

@@ -7,7 +7,7 @@ use homing_core::{
     Action, Base, Camera, GoalDiscovery, GoalEstimate, GoalPhoto, Mode, Motion, MotionOutcome, NavigationState,
     Observation, OccupancyGrid, PlanarPose, Resettable, RobotBridge, Transform,
 };
-use homing_perception::{GoalEstimator, PerceptionConfig};
+use homing_perception::AnyEstimator;
 use homing_planner::{Mission, Perception, Planner, PlannerConfig, PlannerObservation, StepEvent};
 use homing_sim::arena::Arena;
 use homing_sim::episode::{Episode, t_world_base};
@@ -81,12 +81,12 @@ pub struct EpisodeRun {
 pub fn run_episode(
     arena: &Arc<Arena>,
     episode: &Episode,
-    perception: PerceptionConfig,
+    estimator: AnyEstimator,
     planner: PlannerConfig,
     discovery: Box<dyn GoalDiscovery>,
     observer: &mut dyn FnMut(&StepRecord<'_>),
 ) -> Result<EpisodeRun, RunError> {
-    let mut lockstep = Lockstep::new(arena, episode, perception, planner, discovery)?;
+    let mut lockstep = Lockstep::new(arena, episode, estimator, planner, discovery)?;
     while !lockstep.step(observer)? {}
     Ok(lockstep.finish(episode))
 }
@@ -94,7 +94,7 @@ pub fn run_episode(
 /// Body, perception and planner between two steps.
 struct Lockstep {
     robot: Simulator,
-    estimator: GoalEstimator,
+    estimator: AnyEstimator,
     planner: Planner,
     config: PlannerConfig,
     goal_odom_truth: PlanarPose,
@@ -108,13 +108,12 @@ impl Lockstep {
     fn new(
         arena: &Arc<Arena>,
         episode: &Episode,
-        perception: PerceptionConfig,
+        mut estimator: AnyEstimator,
         config: PlannerConfig,
         discovery: Box<dyn GoalDiscovery>,
     ) -> Result<Self, RunError> {
         let mut robot = Simulator::new(Arc::clone(arena), SimConfig::default())?;
         robot.reset(episode)?;
-        let mut estimator = GoalEstimator::new(perception)?;
         let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
         estimator.set_goal(GoalPhoto { id: GOAL_ID, rgb, intrinsics: episode.camera.intrinsics()? })?;
         let t_world_goal: Transform<_, Base> = t_world_base(arena, episode.goal.into());

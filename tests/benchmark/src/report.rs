@@ -31,6 +31,8 @@ pub struct EpisodeRow {
 pub struct BenchReport {
     /// Goal discovery.
     pub policy: Policy,
+    /// Extractor and matcher.
+    pub features: String,
     /// Least and greatest geodesic distance of the episodes asked for, metres.
     pub distance_m: (f64, f64),
     /// Episodes.
@@ -82,6 +84,7 @@ impl BenchReport {
         }
         Self {
             policy: options.policy,
+            features: format!("{} + {}", options.features.extractor.name(), options.features.matcher.name()),
             distance_m: (options.spec.min_m, options.spec.max_m),
             n_episodes: n,
             success_rate: won.len() as f64 / n.max(1) as f64,
@@ -161,8 +164,9 @@ impl fmt::Display for BenchReport {
         let or_none = |x: Option<f64>| x.map_or("-".to_owned(), |v| format!("{v:.2}"));
         writeln!(
             f,
-            "{:?}: success {:.1} % (95 %: {:.1} to {:.1}) of {} episodes, SPL {:.3}",
+            "{:?}, {}: success {:.1} % (95 %: {:.1} to {:.1}) of {} episodes, SPL {:.3}",
             self.policy,
+            self.features,
             percent(self.success_rate),
             percent(self.success_rate_95.0),
             percent(self.success_rate_95.1),
