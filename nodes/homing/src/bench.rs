@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Ended;
 use crate::demo::Policy;
+use crate::settings::FeatureArgs;
 
 /// Runs one curved episode of 3 to 10 m in the flat of each seed, and reports success, SPL and final errors.
 ///
@@ -24,12 +25,8 @@ pub struct BenchArgs {
     /// How to explore while the goal has not been seen.
     #[arg(long, value_enum, default_value_t = Policy::Frontier)]
     policy: Policy,
-    /// What finds keypoints: sift, or the name of a model (homing models lists them).
-    #[arg(long, default_value = "sift")]
-    extractor: String,
-    /// What pairs them: mutual-nearest, dual-softmax, or the name of a model.
-    #[arg(long, default_value = "mutual-nearest")]
-    matcher: String,
+    #[command(flatten)]
+    features: FeatureArgs,
     /// The folder with the models and their manifest.json.
     #[arg(long, default_value = "nodes/perception/models")]
     models: PathBuf,
@@ -66,8 +63,8 @@ pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
         Policy::Frontier => homing_benchmark::Policy::Frontier,
     };
     let features = FeatureChoice {
-        extractor: ExtractorChoice::resolve(&ModelName::Listed(args.extractor), &args.models)?,
-        matcher: MatcherChoice::resolve(&ModelName::Listed(args.matcher), &args.models)?,
+        extractor: ExtractorChoice::resolve(&ModelName::Listed(args.features.extractor), &args.models)?,
+        matcher: MatcherChoice::resolve(&ModelName::Listed(args.features.matcher), &args.models)?,
         // Episodes side by side use the cores better than the threads of one.
         run: RunConfig { threads: 1, ..RunConfig::default() },
         ..FeatureChoice::default()

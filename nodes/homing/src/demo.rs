@@ -21,7 +21,9 @@ use crate::fleet::Fleet;
 use crate::latency::Stopwatch;
 use crate::mission::{self, Watched};
 use crate::run_folder::RunFolder;
-use crate::settings::{MonitorFile, Network, PerceptionFile, PlannerFile, PlannerPace, SimFile, TruthFile};
+use crate::settings::{
+    FeatureArgs, MonitorFile, Network, PerceptionFile, PlannerFile, PlannerPace, SimFile, TruthFile,
+};
 use crate::verdict::{About, Verdict};
 use crate::{Ended, photo};
 
@@ -46,6 +48,8 @@ pub struct DemoArgs {
     /// How to explore while the goal has not been seen.
     #[arg(long, value_enum, default_value_t = Policy::Frontier)]
     policy: Policy,
+    #[command(flatten)]
+    features: FeatureArgs,
     /// By the wall clock instead of in lockstep.
     #[arg(long)]
     realtime: bool,
@@ -211,7 +215,7 @@ fn start(args: &DemoArgs, task: &Task, folder: &RunFolder) -> anyhow::Result<Fle
         None => Some(folder.write_json("truth.json", &task.truth()?)?),
     };
     let sim = folder.write_toml("sim.toml", &SimFile { pace, episode, session: Network::listen(&args.endpoint) })?;
-    let perception = folder.write_toml("perception.toml", &PerceptionFile { session: network() })?;
+    let perception = folder.write_toml("perception.toml", &PerceptionFile::new(&args.features, network()))?;
     let planner = PlannerFile { policy: args.policy.name(), session: network(), pace: PlannerPace { answer_ms_max } };
     let planner = folder.write_toml("planner.toml", &planner)?;
     let monitor = MonitorFile {

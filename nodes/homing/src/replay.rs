@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::fleet::Fleet;
 use crate::run_folder::{RunFolder, shown};
-use crate::settings::{MonitorFile, Network, PerceptionFile, RobotFile};
+use crate::settings::{FeatureArgs, MonitorFile, Network, PerceptionFile, RobotFile};
 use crate::{Ended, photo};
 
 /// Plays a recording of real RGB-D frames through the same topics, processes and perception, and compares every estimate
@@ -31,6 +31,8 @@ pub struct ReplayArgs {
     /// Every tenth frame as start, with the goal so many original frames later: one table for each number.
     #[arg(long, value_name = "50,100", value_delimiter = ',')]
     pairs: Vec<u32>,
+    #[command(flatten)]
+    features: FeatureArgs,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -184,7 +186,7 @@ fn start(args: &ReplayArgs, folder: &RunFolder, pairs: &[(u32, u32)], one_goal: 
     };
     let robot = folder.write_toml("robot.toml", &robot)?;
     let network = || Network::connect(&args.endpoint);
-    let perception = folder.write_toml("perception.toml", &PerceptionFile { session: network() })?;
+    let perception = folder.write_toml("perception.toml", &PerceptionFile::new(&args.features, network()))?;
     let monitor = MonitorFile {
         recording: folder.file("replay.rrd"),
         viewer: None,

@@ -33,7 +33,42 @@ pub struct SimFile {
 
 #[derive(Serialize)]
 pub struct PerceptionFile {
+    pub features: FeaturesTable,
+    pub matcher: MatcherTable,
     pub session: Network,
+}
+
+/// `[features]` of perception.
+#[derive(Serialize)]
+pub struct FeaturesTable {
+    pub extractor: String,
+}
+
+/// `[matcher]` of perception.
+#[derive(Serialize)]
+pub struct MatcherTable {
+    pub method: String,
+}
+
+/// Which features perception uses.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FeatureArgs {
+    /// What finds keypoints: sift, or the name of a model (`homing models` lists them).
+    #[arg(long, default_value = "sift", value_name = "NAME")]
+    pub extractor: String,
+    /// What pairs them: mutual-nearest, dual-softmax, or the name of a model.
+    #[arg(long, default_value = "mutual-nearest", value_name = "NAME")]
+    pub matcher: String,
+}
+
+impl PerceptionFile {
+    pub fn new(features: &FeatureArgs, session: Network) -> Self {
+        Self {
+            features: FeaturesTable { extractor: features.extractor.clone() },
+            matcher: MatcherTable { method: features.matcher.clone() },
+            session,
+        }
+    }
 }
 
 #[derive(Serialize)]
