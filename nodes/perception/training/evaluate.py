@@ -134,8 +134,9 @@ def solve_pose(pair: PosedPair, points_a: np.ndarray, points_b: np.ndarray) -> t
 
 def correct_matches(pair: PosedPair, points_a: np.ndarray, points_b: np.ndarray) -> tuple[int, int]:
     """How many matches are right by depth and pose, and of how many that can be told."""
-    if not len(points_a):
-        return 0, 0
+    recorded = np.isnan(pair.overlap)
+    if recorded or not len(points_a):
+        return 0, 0  # A recording's depth is too coarse, and not registered to the picture: it cannot judge pixels.
     shapes = [image.shape for image in pair.images]
     warp = Warp(*pair.views, np.eye(3), np.eye(3), False, *shapes)
     targets, visible, known = warp.points(points_a.astype(np.float64))
@@ -159,7 +160,8 @@ def _shares(rows: list[dict]) -> dict:
     for name, (metres, degrees) in TOLERANCES.items():
         summary[name] = round(sum(r["m"] <= metres and r["deg"] <= degrees for r in rows) / len(rows), 4)
     judged = [r for r in rows if r["judged"]]
-    summary["matching_accuracy"] = round(float(np.mean([r["right"] / r["judged"] for r in judged])), 4) if judged else 0.0
+    if judged:
+        summary["matching_accuracy"] = round(float(np.mean([r["right"] / r["judged"] for r in judged])), 4)
     summary["matches"] = float(np.median([r["matches"] for r in rows]))
     summary["inliers"] = float(np.median([r["inliers"] for r in rows]))
     return summary
