@@ -10,7 +10,7 @@ use homing_core::PlanarPose;
 use homing_privileged::{EPISODE_SUMMARY, GROUND_TRUTH, GroundTruth};
 use homing_protocol::convert::{EncodedPhoto, ToDomain};
 use homing_protocol::interfaces::homing_msgs::{self, EpisodeSummary};
-use homing_protocol::session::{DEFAULT_ENDPOINT, Link, SessionConfig};
+use homing_protocol::session::{DEFAULT_ENDPOINT, Link, SessionConfig, SessionError};
 use homing_protocol::{Session, Subscription, topics};
 use homing_sim::episode::{self, GoalPlace};
 use homing_sim::geodesic::GeodesicField;
@@ -87,6 +87,7 @@ impl Policy {
 
 #[tokio::main]
 pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
+    let viewer = args.view.then(viewer).transpose()?;
     let given = args.goal.as_deref().map(|path| photo::read(path, args.hfov_deg)).transpose()?;
     let bar = waiting("preparing the scene");
     let task = tokio::task::block_in_place(|| Task::draw(&args))?;
@@ -101,7 +102,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
         eprintln!("seed {}; files in {}", args.seed, crate::run_folder::shown(&folder.file("")));
     }
     bar.set_message("starting four processes: body, perception, planner, monitor");
-    let mut fleet = start(&args, &task, &folder)?;
+    let mut fleet = start(&args, &task, &folder, viewer)?;
     let session = join(&args, &mut fleet).await?;
     let mut scorer = Scorer { truths: session.subscribe(&GROUND_TRUTH, 64)?, last: None };
     let mut stopwatch = Stopwatch::open(&session)?;
@@ -206,7 +207,7 @@ impl Task {
     }
 }
 
-fn start(args: &DemoArgs, task: &Task, folder: &RunFolder) -> anyhow::Result<Fleet> {
+fn start(args: &DemoArgs, task: &Task, folder: &RunFolder, viewer: Option<PathBuf>) -> anyhow::Result<Fleet> {
     let network = || Network::connect(&args.endpoint);
     let episode = folder.write_json("episode.json", &task.episode)?;
     let (pace, answer_ms_max) = if args.realtime { ("real_time", 500) } else { ("lockstep", 5_000) };
@@ -220,7 +221,7 @@ fn start(args: &DemoArgs, task: &Task, folder: &RunFolder) -> anyhow::Result<Fle
     let planner = folder.write_toml("planner.toml", &planner)?;
     let monitor = MonitorFile {
         recording: folder.file("episode.rrd"),
-        viewer: if args.view { Some(viewer()?) } else { None },
+        viewer,
         picture: Some(folder.file("episode.png")),
         truth,
         session: network(),
@@ -263,6 +264,8 @@ async fn join(args: &DemoArgs, fleet: &mut Fleet) -> anyhow::Result<Session> {
                 fail_on_loss(fleet)?;
                 return Ok(session);
             }
+            // Waiting does not make it an address.
+            Err(cause @ SessionError::Endpoint { .. }) => return Err(cause.into()),
             Err(cause) => tracing::debug!(%cause, "not yet"),
         }
     }
