@@ -1,9 +1,11 @@
 //! `homing bench`: many episodes in this process, as fast as the machine goes.
 
+mod visual_target;
+
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use clap::Args;
+use clap::{Args, Subcommand};
 use homing_benchmark::{BenchOptions, EpisodeRow, bench};
 use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,7 +20,10 @@ use crate::settings::FeatureArgs;
 /// episode, as it ends: won or not, steps, way driven and shortest, SPL, distance and heading left at the end; the steps at
 /// which the goal first came into view and was first found; right and wrong estimates, and steps with a wrong goal in mind.
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct BenchArgs {
+    #[command(subcommand)]
+    other: Option<Other>,
     /// Seeds, as A..B: from A to B without B.
     #[arg(long, default_value = "1000..1100", value_parser = seeds)]
     seeds: std::ops::Range<u64>,
@@ -38,6 +43,13 @@ pub struct BenchArgs {
     json: Option<PathBuf>,
 }
 
+/// Other benchmarks.
+#[derive(Subcommand)]
+enum Other {
+    /// From a view to another view of the same flat, without a map: the table of the paper "Visual Target Navigation".
+    VisualTarget(visual_target::VisualTargetArgs),
+}
+
 pub fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
     let parse = || {
         let (from, to) = text.split_once("..")?;
@@ -50,6 +62,9 @@ pub fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
 }
 
 pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
+    if let Some(Other::VisualTarget(args)) = args.other {
+        return visual_target::run(args);
+    }
     // Known before the hours are spent: can the report be written?
     if let Some(path) = &args.json {
         std::fs::File::options()

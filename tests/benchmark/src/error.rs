@@ -28,6 +28,21 @@ pub enum RunError {
     /// The simulated body failed.
     #[error("the body: {0}")]
     Body(#[from] BridgeError),
+    /// No flat offers a pair of views as asked for.
+    #[error(
+        "none of {flats} flats offers two views {distance_m:.2} m and {heading_deg:.0} deg apart that share enough"
+    )]
+    NoPair {
+        /// Metres asked for.
+        distance_m: f64,
+        /// Degrees asked for.
+        heading_deg: f64,
+        /// Flats tried.
+        flats: u64,
+    },
+    /// An image that is none.
+    #[error("the camera's images: {0}")]
+    Frame(String),
     /// No thread to work on.
     #[error("no worker threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

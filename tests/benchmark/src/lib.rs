@@ -8,6 +8,7 @@ pub mod cause;
 pub mod episode;
 mod error;
 pub mod report;
+pub mod visual_target;
 
 pub use bench::{BenchOptions, Policy, bench};
 pub use cause::{Cause, Watch};
