@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use homing_benchmark::visual_target::bench::PairRuns;
 use homing_benchmark::visual_target::{
-    Difficulty, Method, Options, PairRun, PairSpec, Report, Solver, TargetPair, bench, contact_sheet, rows,
+    Difficulty, Options, PairRun, PairSpec, Pipeline, Report, Solver, TargetPair, bench, contact_sheet,
 };
 use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
 use homing_sim::Viewpoint;
@@ -61,7 +61,7 @@ pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
     }
     let camera = Viewpoint { hfov_rad: args.hfov_deg.to_radians(), ..Viewpoint::default() };
     let pairs = PairSpec { n_each: usize::from(args.pairs), seed: args.seed, camera, overlap_min: args.overlap_min };
-    let options = Options { pairs, methods: methods(&args.models), threads: args.threads };
+    let options = Options { pairs, pipelines: pipelines(&args.models), threads: args.threads };
     let bar = ProgressBar::new(3 * u64::from(args.pairs)).with_style(style());
     let report = bench(&options, &|(pair, runs): &PairRuns| {
         bar.inc(1);
@@ -85,15 +85,15 @@ const FEATURES: [(&str, &str, &str, Solver); 3] = [
 ];
 
 /// All rows; those whose model is missing are left out with a word.
-fn methods(models: &Path) -> Vec<Method> {
-    let mut methods = Vec::new();
+fn pipelines(models: &Path) -> Vec<Pipeline> {
+    let mut pipelines = Vec::new();
     for (name, extractor, matcher, solver) in FEATURES {
         match features(extractor, matcher, models) {
-            Ok(features) => methods.extend(rows(name, &features, solver)),
+            Ok(features) => pipelines.push(Pipeline { name: name.to_owned(), features, solver }),
             Err(cause) => eprintln!("the rows \"{name}\" are left out: {cause:#}"),
         }
     }
-    methods
+    pipelines
 }
 
 fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {
