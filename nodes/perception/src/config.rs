@@ -34,6 +34,8 @@ pub struct Gates {
     pub n_patches_min: usize,
     /// Smallest share of them that must look like the photo.
     pub patch_share_min: f64,
+    /// Largest shift of the drawn picture against the photo, radians.
+    pub patch_shift_rad_max: f64,
     /// Fewest verified matches of a bearing without depth: a line binds a match less than a point.
     pub n_bearing_min: usize,
     /// Smallest share of the matches that a bearing must explain.
@@ -52,6 +54,7 @@ impl Default for Gates {
             error_rad_max: 0.008,
             n_patches_min: 12,
             patch_share_min: 0.6,
+            patch_shift_rad_max: 0.05,
             n_bearing_min: 25,
             bearing_share_min: 0.4,
         }
@@ -137,6 +140,7 @@ impl PerceptionConfig {
             ("error_rad_max", g.error_rad_max, (1e-5, 0.2), "0.00001..=0.2 rad"),
             ("n_patches_min", g.n_patches_min as f64, (0.0, 10_000.0), "0..=10000"),
             ("patch_share_min", g.patch_share_min, (0.0, 1.0), "0..=1"),
+            ("patch_shift_rad_max", g.patch_shift_rad_max, (0.0, 0.2), "0..=0.2 rad"),
             ("hypotheses_max", f64::from(self.hypotheses_max), (1.0, 100.0), "1..=100"),
             ("n_bearing_min", g.n_bearing_min as f64, (6.0, 10_000.0), "6..=10000"),
             ("bearing_share_min", g.bearing_share_min, (0.0, 1.0), "0..=1"),

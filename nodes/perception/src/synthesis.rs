@@ -2,7 +2,7 @@
 //! goal camera would see it, and compared with the photo. Two rooms with one wallpaper agree on hundreds of keypoints; they
 //! do not agree on what stands in front of it.
 
-use homing_core::{DepthImage, Intrinsics, RgbImage};
+use homing_core::{Intrinsics, RgbImage, RgbdFrame};
 
 use crate::pnp::CameraPose;
 
@@ -57,13 +57,37 @@ impl Thumbnail {
     }
 }
 
-/// What the robot sees, as far as drawing it from elsewhere needs it.
-#[derive(Copy, Clone)]
-pub(crate) struct Seen<'a> {
-    /// Grey, row-major, of the size of `depth`.
-    pub grey: &'a [u8],
-    pub depth: &'a DepthImage,
-    pub camera: &'a Intrinsics,
+/// What the robot sees, as far as drawing it from elsewhere needs it: every few pixels in both directions.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    camera: Intrinsics,
+    samples: Vec<Sample>,
+}
+
+/// One pixel with depth.
+#[derive(Copy, Clone, Debug)]
+struct Sample {
+    u: u16,
+    v: u16,
+    depth_m: f32,
+    grey: u8,
+}
+
+impl Seen {
+    pub fn of(frame: &RgbdFrame) -> Self {
+        let (width, height) = (frame.depth.width(), frame.depth.height());
+        let grey = frame.rgb.to_luma();
+        let step = (width.max(height) / SAMPLES).max(1) as usize;
+        let mut samples = Vec::new();
+        for v in (0..height).step_by(step) {
+            for u in (0..width).step_by(step) {
+                if let (Some(depth_m), Some(&grey)) = (frame.depth.at(u, v), grey.get((v * width + u) as usize)) {
+                    samples.push(Sample { u: u as u16, v: v as u16, depth_m, grey });
+                }
+            }
+        }
+        Self { camera: frame.intrinsics, samples }
+    }
 }
 
 /// How well frame and photo agree.
@@ -75,15 +99,53 @@ pub(crate) struct Agreement {
     pub share: f64,
 }
 
-/// Compares the photo with the frame seen from `pose`.
-pub(crate) fn agreement(seen: &Seen<'_>, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Agreement {
+/// How alike frame and photo must be, and how far the whole picture may be shifted for it.
+#[derive(Copy, Clone, Debug)]
+pub(crate) struct Likeness {
+    /// Fewest patches.
+    pub n_patches_min: usize,
+    /// Smallest share of them that correlate.
+    pub share_min: f64,
+    /// Largest shift of the drawn picture against the photo, radians: depth that is not registered to the colour, and
+    /// intrinsics that are a guess, turn a right pose by a few degrees.
+    pub shift_rad: f64,
+}
+
+impl Likeness {
+    fn holds(&self, agreement: &Agreement) -> bool {
+        agreement.n_patches >= self.n_patches_min && agreement.share >= self.share_min
+    }
+}
+
+/// Whether the photo shows what the frame shows, drawn from `pose`.
+pub(crate) fn bears_out(
+    seen: &Seen,
+    photo: &Thumbnail,
+    goal_camera: &Intrinsics,
+    pose: &CameraPose,
+    likeness: &Likeness,
+) -> bool {
     let drawn = draw(seen, photo, goal_camera, pose);
+    let most = (likeness.shift_rad * goal_camera.fx() / photo.cell_px).round() as i32;
+    // Unshifted first: most right poses need no more.
+    let mut shifts: Vec<(i32, i32)> = (-most..=most).flat_map(|dy| (-most..=most).map(move |dx| (dx, dy))).collect();
+    shifts.sort_by_key(|(dx, dy)| dx * dx + dy * dy);
+    shifts.into_iter().any(|shift| likeness.holds(&agreement(&drawn, photo, shift)))
+}
+
+/// Compares the photo with what was drawn, moved by `shift` cells (columns, rows).
+fn agreement(drawn: &[Option<f64>], photo: &Thumbnail, shift: (i32, i32)) -> Agreement {
     let (mut n_patches, mut n_same) = (0, 0);
+    let from = |column: usize, row: usize| {
+        let (x, y) = (column as i64 - i64::from(shift.0), row as i64 - i64::from(shift.1));
+        let inside = (0..photo.columns as i64).contains(&x) && (0..photo.rows as i64).contains(&y);
+        if inside { drawn[y as usize * photo.columns + x as usize] } else { None }
+    };
     for row in (0..photo.rows.saturating_sub(PATCH - 1)).step_by(STRIDE) {
         for column in (0..photo.columns.saturating_sub(PATCH - 1)).step_by(STRIDE) {
-            let corner = row * photo.columns + column;
-            let cells = (0..PATCH * PATCH).map(|i| corner + i / PATCH * photo.columns + i % PATCH);
-            if let Some(same) = compare(cells.filter_map(|i| Some((drawn[i]?, photo.grey[i])))) {
+            let cells = (0..PATCH * PATCH).map(|i| (column + i % PATCH, row + i / PATCH));
+            let pairs = cells.filter_map(|(x, y)| Some((from(x, y)?, photo.grey[y * photo.columns + x])));
+            if let Some(same) = compare(pairs) {
                 n_patches += 1;
                 n_same += usize::from(same);
             }
@@ -93,21 +155,16 @@ pub(crate) fn agreement(seen: &Seen<'_>, photo: &Thumbnail, goal_camera: &Intrin
 }
 
 /// Mean grey of what the frame shows in each cell of the photo; what is nearer to the goal camera hides what is behind.
-fn draw(seen: &Seen<'_>, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Vec<Option<f64>> {
+fn draw(seen: &Seen, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Vec<Option<f64>> {
     let mut nearest_m = vec![f64::INFINITY; photo.grey.len()];
     let mut points = Vec::new();
-    let (width, height) = (seen.depth.width(), seen.depth.height());
-    let step = (width.max(height) / SAMPLES).max(1) as usize;
-    for v in (0..height).step_by(step) {
-        for u in (0..width).step_by(step) {
-            let Some(depth_m) = seen.depth.at(u, v) else { continue };
-            let point = seen.camera.unproject(f64::from(u), f64::from(v), f64::from(depth_m));
-            let at_goal = pose.to_goal(&point);
-            let Some(pixel) = goal_camera.project(&at_goal.into()) else { continue };
-            let Some(cell) = photo.at(pixel.x, pixel.y) else { continue };
-            nearest_m[cell] = nearest_m[cell].min(at_goal.z);
-            points.push((cell, at_goal.z, f64::from(seen.grey[(v * width + u) as usize])));
-        }
+    for sample in &seen.samples {
+        let point = seen.camera.unproject(f64::from(sample.u), f64::from(sample.v), f64::from(sample.depth_m));
+        let at_goal = pose.to_goal(&point);
+        let Some(pixel) = goal_camera.project(&at_goal.into()) else { continue };
+        let Some(cell) = photo.at(pixel.x, pixel.y) else { continue };
+        nearest_m[cell] = nearest_m[cell].min(at_goal.z);
+        points.push((cell, at_goal.z, f64::from(sample.grey)));
     }
     let mut sums = vec![(0.0, 0.0); photo.grey.len()];
     for (cell, z_m, grey) in points {
@@ -137,6 +194,9 @@ fn compare(cells: impl Iterator<Item = (f64, f64)>) -> Option<bool> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
+    use std::sync::Arc;
+
+    use homing_core::{DepthImage, Stamp};
     use nalgebra::{Matrix3, Vector3};
 
     use super::*;
@@ -164,8 +224,10 @@ mod tests {
         let camera = Intrinsics::from_hfov(320, 240, 2.0).unwrap();
         let (rgb, depth) = wall(&camera, Vector3::zeros(), seeds.0);
         let (photo, _) = wall(&camera, at_goal, seeds.1);
-        let seen = Seen { grey: &rgb.to_luma(), depth: &depth, camera: &camera };
-        agreement(&seen, &Thumbnail::of(&photo), &camera, &CameraPose { r: Matrix3::identity(), p: said })
+        let seen = Seen::of(&RgbdFrame::new(Stamp(0), Arc::new(rgb), Arc::new(depth), camera).unwrap());
+        let photo = Thumbnail::of(&photo);
+        let drawn = draw(&seen, &photo, &camera, &CameraPose { r: Matrix3::identity(), p: said });
+        agreement(&drawn, &photo, (0, 0))
     }
 
     #[test]
@@ -177,6 +239,22 @@ mod tests {
         assert!(beside.share < 0.3, "{beside:?}");
         let elsewhere = compare_views(goal, goal, (1, 2));
         assert!(elsewhere.share < 0.3, "{elsewhere:?}");
+    }
+
+    #[test]
+    fn a_pose_that_is_turned_a_little_is_borne_out_and_one_elsewhere_is_not() {
+        let camera = Intrinsics::from_hfov(320, 240, 1.0).unwrap();
+        let (rgb, depth) = wall(&camera, Vector3::zeros(), 1);
+        let seen = Seen::of(&RgbdFrame::new(Stamp(0), Arc::new(rgb.clone()), Arc::new(depth), camera).unwrap());
+        let turned =
+            CameraPose { r: *nalgebra::Rotation3::new(Vector3::new(0.01, 0.04, 0.0)).matrix(), p: Vector3::zeros() };
+        let holds = |photo: &RgbImage, shift_rad| {
+            let likeness = Likeness { n_patches_min: 12, share_min: 0.6, shift_rad };
+            bears_out(&seen, &Thumbnail::of(photo), &camera, &turned, &likeness)
+        };
+        assert!(!holds(&rgb, 0.0) && holds(&rgb, 0.05));
+        let (elsewhere, _) = wall(&camera, Vector3::zeros(), 2);
+        assert!(!holds(&elsewhere, 0.05));
     }
 
     #[test]

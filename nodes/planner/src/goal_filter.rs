@@ -125,6 +125,15 @@ impl GoalFilter {
         self.rigour = 1.0;
     }
 
+    /// The same goal is given again: what spoke for a place still does, what spoke against one may have changed.
+    pub fn begin_again(&mut self) {
+        self.liars.clear();
+        self.rigour = 1.0;
+        for hypothesis in &mut self.hypotheses {
+            (hypothesis.parked_until, hypothesis.last_seen_step, hypothesis.n_misses) = (0, 0, 0);
+        }
+    }
+
     /// The knobs.
     #[must_use]
     pub fn config(&self) -> &FilterConfig {
@@ -137,6 +146,13 @@ impl GoalFilter {
         for hypothesis in &mut self.hypotheses {
             hypothesis.drift(position, yaw);
         }
+    }
+
+    /// Widens a measurement by the odometry's drift over the steps since its image was taken.
+    pub fn age(&self, measurement: &mut Measurement, n_steps: usize) {
+        let n = n_steps as f64;
+        let variances = Vector3::new(self.config.drift_m, self.config.drift_m, self.config.drift_rad);
+        measurement.covariance += Matrix3::from_diagonal(&variances.map(|sd| n * sd * sd));
     }
 
     /// The planar goal pose an estimate stands for: the base pose at which the robot's camera coincides with the goal camera,
