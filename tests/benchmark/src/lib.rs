@@ -2,11 +2,13 @@
 //!
 //! [`episode::run_episode`] is the distributed system's loop without its network: the same events, so the same actions.
 //! [`bench::bench`] runs one episode in each of many generated flats, scores it strictly and says why it failed if it did.
+//! [`perception`] measures the eyes alone, on pairs of images.
 
 pub mod bench;
 pub mod cause;
 pub mod episode;
 mod error;
+pub mod perception;
 pub mod report;
 
 pub use bench::{BenchOptions, Policy, bench};
