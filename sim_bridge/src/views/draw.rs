@@ -84,13 +84,7 @@ pub fn draw_with(seed: u64, spec: &ViewSpec, cameras: &Cameras) -> Result<FlatVi
 }
 
 /// Up to `size` views around one point of interest.
-fn draw_group(
-    stages: &[Stage],
-    spec: &ViewSpec,
-    cameras: &Cameras,
-    size: usize,
-    rng: &mut ChaCha8Rng,
-) -> Vec<View> {
+fn draw_group(stages: &[Stage], spec: &ViewSpec, cameras: &Cameras, size: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
     let mut group: Vec<View> = Vec::with_capacity(size);
     let Some(interest) = point_of_interest(&stages[0], rng) else { return group };
     while group.len() < size {

@@ -194,7 +194,10 @@ mod tests {
     #[test]
     fn the_errors_of_a_pose_are_what_they_say() {
         let at = |x_m: f64, yaw_deg: f64| {
-            homing_core::Transform::new(Isometry3::new(Vector3::new(x_m, 0.0, 2.0), Vector3::y() * yaw_deg.to_radians()))
+            homing_core::Transform::new(Isometry3::new(
+                Vector3::new(x_m, 0.0, 2.0),
+                Vector3::y() * yaw_deg.to_radians(),
+            ))
         };
         let error = PoseError::of(&at(2.0, 175.0), &at(0.0, -170.0));
         assert!((error.position_m - 2.0).abs() < 1e-12);

@@ -5,8 +5,9 @@ mod curves;
 mod style;
 
 use super::accuracy::{Accuracy, Class, TOLERANCES, angular_error_deg};
+use super::findings::Finding;
 use super::measure::Measured;
-use super::report::{PerceptionReport, of_class};
+use super::report::{ConfigurationReport, PerceptionReport, of_class};
 use bars::{Bar, Bars, Group};
 use curves::{Curve, Curves};
 pub use style::PlotError;
@@ -25,7 +26,17 @@ pub struct Plot {
 /// # Errors
 /// [`PlotError`] when a picture cannot be drawn.
 pub fn plots(report: &PerceptionReport, measured: &Measured, class: &Class) -> Result<Vec<Plot>, PlotError> {
-    let mut all = vec![Plot { name: "error_curve.svg", svg: error_curves(report, measured, class)? }];
+    let angle = (
+        "Pairs whose angle error is below x",
+        "greater of rotation and direction error, degrees",
+        &ANGLE_LABELS_DEG[..],
+    );
+    let position = ("Pairs whose position error is below x", "position error, metres", &POSITION_LABELS_M[..]);
+    let position_m = |f: &Finding| f.error().map_or(f64::INFINITY, |e| e.position_m);
+    let mut all = vec![
+        Plot { name: "angle_error.svg", svg: error_curves(report, measured, class, angle, angular_error_deg)? },
+        Plot { name: "position_error.svg", svg: error_curves(report, measured, class, position, position_m)? },
+    ];
     for (name, title, classes) in [
         ("success_by_overlap.svg", "by what the two views share", Class::by_overlap()),
         ("success_by_turn.svg", "by how far the camera was turned", Class::by_turn()),
@@ -38,22 +49,24 @@ pub fn plots(report: &PerceptionReport, measured: &Measured, class: &Class) -> R
     Ok(all)
 }
 
-fn error_curves(report: &PerceptionReport, measured: &Measured, class: &Class) -> Result<String, PlotError> {
-    let curve = |(i, name): (usize, &String)| {
-        let findings = of_class(&measured.pairs, &measured.findings[i], class);
-        Curve { name: name.clone(), errors: findings.iter().map(angular_error_deg).collect() }
+const ANGLE_LABELS_DEG: [f64; 9] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
+const POSITION_LABELS_M: [f64; 10] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
+
+fn error_curves(
+    report: &PerceptionReport,
+    measured: &Measured,
+    class: &Class,
+    (title, x_axis, x_labels): (&str, &str, &[f64]),
+    error: impl Fn(&Finding) -> f64,
+) -> Result<String, PlotError> {
+    let curve = |(i, c): (usize, &ConfigurationReport)| Curve {
+        name: c.name.clone(),
+        errors: of_class(&measured.pairs, &measured.findings[i], class).iter().map(&error).collect(),
     };
-    let names: Vec<String> = report.configurations.iter().map(|c| c.name.clone()).collect();
-    let curves: Vec<Curve> = names.iter().enumerate().map(curve).collect();
+    let curves: Vec<Curve> = report.configurations.iter().enumerate().map(curve).collect();
     let n = curves.first().map_or(0, |c| c.errors.len());
-    Curves {
-        title: "Pairs with a pose error below ...",
-        subtitle: &format!("{n} pairs: {}", class.words()),
-        x_axis: "greater of rotation and direction error, degrees",
-        x_max: 20.0,
-        curves: &curves,
-    }
-    .draw()
+    let subtitle = format!("{n} pairs: {}; a curve ends below 100 where no pose was found", class.words());
+    Curves { title, subtitle: &subtitle, x_axis, x_labels, curves: &curves }.draw()
 }
 
 /// The middle one of the tolerances: fine enough to arrive, coarse enough to tell weak configurations apart.
@@ -97,7 +110,11 @@ fn stages(report: &PerceptionReport) -> Result<String, PlotError> {
     let group = |(label, of): (&str, fn(&super::stages::StageReport) -> super::stages::Milliseconds)| Group {
         label: label.to_owned(),
         detail: String::new(),
-        bars: all.iter().map(|s| (of(s).p50, of(s).p95)).map(|(p50, p95)| Bar { value: p50, low: p50, high: p95 }).collect(),
+        bars: all
+            .iter()
+            .map(|s| (of(s).p50, of(s).p95))
+            .map(|(p50, p95)| Bar { value: p50, low: p50, high: p95 })
+            .collect(),
     };
     let groups = [
         group(("extract", |s| s.extract_ms)),

@@ -103,15 +103,15 @@ mod tests {
         };
         let (view, half, none) = (facts(0.5, Some(2.0)), facts(0.2, Some(2.0)), facts(0.0, None));
         let cases = [
-            (view, pose(30, 2.0, Some(0.1))),  // right, right
-            (view, pose(10, 2.0, Some(0.1))),  // too few to begin with, enough to go on
-            (view, pose(30, 3.5, Some(1.5))),  // exploits, and drives to a wrong place
-            (view, pose(30, 4.5, Some(2.5))),  // too far for both
-            (view, Finding::Bearing),          // no pose for both
-            (half, Finding::NotSeen),          // not counted
-            (none, pose(30, 2.0, None)),       // wrong, wrong
-            (none, pose(8, 2.0, None)),        // right, wrong
-            (none, Finding::NotSeen),          // right, right
+            (view, pose(30, 2.0, Some(0.1))),                   // right, right
+            (view, pose(10, 2.0, Some(0.1))),                   // too few to begin with, enough to go on
+            (view, pose(30, 3.5, Some(1.5))),                   // exploits, and drives to a wrong place
+            (view, pose(30, 4.5, Some(2.5))),                   // too far for both
+            (view, Finding::Bearing),                           // no pose for both
+            (half, Finding::NotSeen),                           // not counted
+            (none, pose(30, 2.0, None)),                        // wrong, wrong
+            (none, pose(8, 2.0, None)),                         // right, wrong
+            (none, Finding::NotSeen),                           // right, right
             (facts(0.05, Some(1.0)), pose(20, 1.0, Some(0.1))), // counts as wrong, though the place is right
         ];
         let (pairs, findings): (Vec<_>, Vec<_>) = cases.into_iter().unzip();

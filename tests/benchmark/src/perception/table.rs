@@ -47,18 +47,15 @@ fn accuracy_table(f: &mut fmt::Formatter<'_>, rows: &[Accuracy]) -> fmt::Result 
     let [a, b, c] = TOLERANCES.map(|t| t.words());
     writeln!(f, "  {:34}{:>6}  AUC @5   @10   @20  {a:24}{b:24}{c:24}medians", "", "pairs")?;
     for row in rows {
-        let or_none = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+        let medians = match (row.position_m_median, row.rotation_deg_median) {
+            (Some(m), Some(deg)) => format!("{m:.3} m  {deg:.2} deg"),
+            _ => "-".to_owned(),
+        };
         let [a, b, c] = row.within.map(|s| share(&s));
         writeln!(
             f,
-            "  {:34}{:>6}    {:.3}  {:.3}  {:.3}  {a:24}{b:24}{c:24}{} m  {} deg",
-            row.class,
-            row.n,
-            row.auc[0],
-            row.auc[1],
-            row.auc[2],
-            or_none(row.position_m_median, 3),
-            or_none(row.rotation_deg_median, 2),
+            "  {:34}{:>6}    {:.3}  {:.3}  {:.3}  {a:24}{b:24}{c:24}{}",
+            row.class, row.n, row.auc[0], row.auc[1], row.auc[2], medians,
         )?;
     }
     Ok(())
@@ -70,7 +67,11 @@ impl PerceptionReport {
         let all: Vec<(String, SwitchAccuracy)> = self.configurations.iter().filter_map(with).collect();
         let Some((_, first)) = all.first() else { return Ok(()) };
         let n = first.explore_to_exploit.right.n;
-        writeln!(f, "\nswitches on {n} pairs{:31}right in all           goal in view           not in view", "")?;
+        writeln!(
+            f,
+            "\n{:51}right in all           goal in view           not in view",
+            format!("switches on {n} pairs")
+        )?;
         for (name, s) in &all {
             switch_row(f, name, "explore to exploit", &s.explore_to_exploit)?;
             switch_row(f, name, "exploit to explore", &s.exploit_to_explore)?;

@@ -73,7 +73,7 @@ impl Probe {
     fn open(setup: &Setup, threads: u16, same_features_as: Option<usize>) -> Result<Self, PerceptionError> {
         let perception = PerceptionConfig { threads: Some(threads), ..setup.perception };
         let mut features = setup.features.clone();
-        features.run.threads = threads.into();
+        features.run.threads = threads;
         let Parts { extractor, matcher } = features.open(&perception)?;
         let handed = Handed::default();
         let estimator = GoalEstimator::with_parts(perception, handed.clone(), matcher)?;

@@ -52,6 +52,7 @@ impl Bars<'_> {
         let n_groups = self.groups.len().max(1) as f64;
         let mut chart = ChartBuilder::on(&root)
             .margin_top(HEAD_PX + 28)
+            .margin_left(12)
             .margin_right(32)
             .x_label_area_size(60)
             .y_label_area_size(76)
@@ -109,7 +110,7 @@ impl Bars<'_> {
 
     /// A line of squares and names above the axes.
     fn draw_names(&self, root: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Failed> {
-        let mut x = 76;
+        let mut x = 88;
         for (i, name) in self.names.iter().enumerate() {
             let y = HEAD_PX as i32;
             root.draw(&Rectangle::new([(x, y), (x + 14, y + 14)], colour(i).filled()))?;

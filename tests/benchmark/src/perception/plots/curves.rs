@@ -1,4 +1,4 @@
-//! Shares of errors below x.
+//! Shares of errors below x, x on a logarithmic axis: errors of good and of bad configurations lie a hundredfold apart.
 
 use plotters::prelude::*;
 
@@ -15,7 +15,8 @@ pub(super) struct Curves<'a> {
     pub title: &'a str,
     pub subtitle: &'a str,
     pub x_axis: &'a str,
-    pub x_max: f64,
+    /// Labelled values of the axis, ascending; it spans them.
+    pub x_labels: &'a [f64],
     pub curves: &'a [Curve],
 }
 
@@ -31,24 +32,26 @@ impl Curves<'_> {
         root.fill(&WHITE)?;
         root.draw(&Text::new(self.title, (24, 18), ink(26)))?;
         root.draw(&Text::new(self.subtitle, (24, 52), pale(16)))?;
+        let [x_min, .., x_max] = self.x_labels else { return Ok(()) };
+        let x_axis = (*x_min..*x_max).log_scale().with_key_points(self.x_labels.to_vec());
         let mut chart = ChartBuilder::on(&root)
             .margin_top(HEAD_PX)
+            .margin_left(12)
             .margin_right(32)
             .margin_bottom(12)
             .x_label_area_size(56)
             .y_label_area_size(76)
-            .build_cartesian_2d(0.0..self.x_max, 0.0..100.0)?;
+            .build_cartesian_2d(x_axis, 0.0..100.0)?;
         chart
             .configure_mesh()
-            .disable_x_mesh()
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(GRID)
             .x_desc(self.x_axis)
             .y_desc("percent of pairs")
-            .x_label_formatter(&|x| format!("{x:.0}"))
+            .x_label_formatter(&|x| format!("{x}"))
             .y_label_formatter(&|y| format!("{y:.0}"))
-            .x_labels(6)
+            .x_labels(self.x_labels.len())
             .y_labels(6)
             .label_style(pale(15))
             .axis_desc_style(ink(16))
@@ -56,7 +59,7 @@ impl Curves<'_> {
         for (i, curve) in self.curves.iter().enumerate() {
             let line = colour(i).stroke_width(3);
             chart
-                .draw_series(LineSeries::new(steps(&curve.errors, self.x_max), line))?
+                .draw_series(LineSeries::new(steps(&curve.errors, (*x_min, *x_max)), line))?
                 .label(curve.name.clone())
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], line));
         }
@@ -72,14 +75,14 @@ impl Curves<'_> {
     }
 }
 
-/// Corners of the curve, percent, up to `x_max`; it begins at 0 and goes straight from error to error, as its area does.
-fn steps(errors: &[f64], x_max: f64) -> Vec<(f64, f64)> {
+/// Corners of the curve, percent, from `x_min` to `x_max`.
+fn steps(errors: &[f64], (x_min, x_max): (f64, f64)) -> Vec<(f64, f64)> {
     let mut below: Vec<f64> = errors.iter().copied().filter(|e| *e < x_max).collect();
     below.sort_by(f64::total_cmp);
     let percent = |n: usize| 100.0 * n as f64 / errors.len().max(1) as f64;
-    let n = below.len();
-    let corners = below.into_iter().enumerate().map(|(i, e)| (e, percent(i + 1)));
-    core::iter::once((0.0, 0.0)).chain(corners).chain([(x_max, percent(n))]).collect()
+    let n_before = below.iter().filter(|e| **e <= x_min).count();
+    let corners = (n_before..below.len()).map(|i| (below[i], percent(i + 1)));
+    core::iter::once((x_min, percent(n_before))).chain(corners).chain([(x_max, percent(below.len()))]).collect()
 }
 
 #[cfg(test)]
@@ -88,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_curve_climbs_at_every_error() {
-        let corners = steps(&[3.0, 1.0, f64::INFINITY, 30.0], 20.0);
-        assert_eq!(corners, [(0.0, 0.0), (1.0, 25.0), (3.0, 50.0), (20.0, 50.0)]);
+        let corners = steps(&[3.0, 0.05, 1.0, f64::INFINITY, 30.0], (0.1, 20.0));
+        assert_eq!(corners, [(0.1, 20.0), (1.0, 40.0), (3.0, 60.0), (20.0, 60.0)]);
     }
 }
