@@ -24,6 +24,7 @@ mod projection;
 mod route;
 mod switches;
 mod terrain;
+pub mod visual_target;
 
 pub use arrival::ArrivalConfig;
 pub use config::{BlindPolicy, BodyConfig, ConfigError, PlannerConfig, UnknownCells};

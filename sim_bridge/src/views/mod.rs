@@ -15,7 +15,7 @@ use homing_core::{Camera, DepthImage, Intrinsics, IntrinsicsError, RgbImage, Tra
 use thiserror::Error;
 
 pub use draw::{draw, draw_with};
-pub use overlap::{agrees, overlap};
+pub use overlap::{agrees, overlap, seen_share};
 
 use crate::arena::ArenaError;
 use crate::constants::{CAMERA_HEIGHT, CAMERA_HEIGHT_M, CAMERA_HFOV_RAD, CAMERA_WIDTH};
@@ -75,7 +75,7 @@ pub struct View {
     pub t_world_camera: Transform<World, Camera>,
     /// Colour.
     pub rgb: RgbImage,
-    /// Depth along the optical axis, a whole number of millimetres, as an export stores it.
+    /// Depth along the optical axis; [`draw`] gives whole millimetres, as an export stores it.
     pub depth: DepthImage,
     /// Which state of the flat it shows: 0 as generated, others with other light and some furniture moved.
     pub variant: u32,

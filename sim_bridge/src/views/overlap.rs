@@ -26,8 +26,9 @@ pub fn agrees(expected_m: f64, measured_m: f64) -> bool {
     (expected_m - measured_m).abs() <= AGREE_M.max(AGREE_SHARE * expected_m)
 }
 
-/// Share of the pixels of `from` that have depth and whose point `to` sees; 0 without any depth.
-fn seen_share(from: &View, to: &View) -> f64 {
+/// Share of the pixels of `from` that have depth and whose point `to` sees, 0 to 1; 0 without any depth.
+#[must_use]
+pub fn seen_share(from: &View, to: &View) -> f64 {
     let t_to_from = (to.t_world_camera.inverse() * from.t_world_camera).isometry().to_homogeneous();
     let (mut asked, mut seen) = (0_u32, 0_u32);
     for row in (0..from.depth.height()).step_by(STRIDE) {

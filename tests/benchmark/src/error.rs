@@ -38,6 +38,21 @@ pub enum RunError {
     /// Recorded frames cannot be read.
     #[error("recorded frames: {0}")]
     Recording(Box<dyn core::error::Error + Send + Sync>),
+    /// A picture whose size does not fit its data.
+    #[error("a picture: {0}")]
+    Image(#[source] homing_core::ImageError),
+    /// No flat offers a pair of views as asked for.
+    #[error(
+        "none of {flats} flats offers two views {distance_m:.2} m and {heading_deg:.0} deg apart that share enough"
+    )]
+    NoPair {
+        /// Metres asked for.
+        distance_m: f64,
+        /// Degrees asked for.
+        heading_deg: f64,
+        /// Flats tried.
+        flats: u64,
+    },
     /// No thread to work on.
     #[error("no worker threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

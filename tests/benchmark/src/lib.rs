@@ -9,9 +9,10 @@ pub mod bench;
 pub mod cause;
 pub mod episode;
 mod error;
-pub mod recall;
 pub mod perception;
+pub mod recall;
 pub mod report;
+pub mod visual_target;
 
 pub use bench::{BenchOptions, Policy, bench};
 pub use cause::{Cause, Watch};

@@ -4,6 +4,7 @@ mod configuration;
 mod navigation;
 mod perception;
 mod recorded;
+mod visual_target;
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ use crate::Ended;
 /// episode, as it ends: won or not, steps, way driven and shortest, SPL, distance and heading left at the end; the steps at
 /// which the goal first came into view and was first found; right and wrong estimates, and steps with a wrong goal in mind.
 ///
-/// `homing bench perception` measures the eyes alone.
+/// `homing bench perception` measures the eyes alone, `homing bench visual-target` a robot that has nothing but them.
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct BenchArgs {
@@ -31,12 +32,15 @@ pub struct BenchArgs {
 #[derive(Subcommand)]
 enum What {
     Perception(Box<perception::PerceptionArgs>),
+    /// From a view to another view of the same flat, without a map: the table of the paper "Visual Target Navigation".
+    VisualTarget(visual_target::VisualTargetArgs),
 }
 
 pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
     match args.what {
         None => navigation::run(args.navigation),
         Some(What::Perception(args)) => perception::run(*args),
+        Some(What::VisualTarget(args)) => visual_target::run(args),
     }
 }
 

@@ -1,0 +1,154 @@
+//! `homing bench visual-target`: the table of the paper "Visual Target Navigation", by one command.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use homing_benchmark::visual_target::bench::PairRuns;
+use homing_benchmark::visual_target::{
+    Difficulty, Method, Options, PairRun, PairSpec, Report, Solver, TargetPair, bench, contact_sheet, rows,
+};
+use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
+use homing_sim::Viewpoint;
+use homing_sim::views::OVERLAP_MIN;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::Ended;
+use crate::photo::{field_of_view, png};
+
+/// Leads a robot from a view to another view of the same flat, without map or planner, and prints the table of the paper
+/// "Visual Target Navigation" with its own figures beside.
+///
+/// Of each of three difficulties 20 pairs of views are drawn, at the paper's mean distances and headings. From the start
+/// view the pose of the target view is estimated, and the robot is put there (one step), or put there and looks again
+/// (multi-step); without depth it goes unit steps in the estimated direction. Each is done with R2D2-like, our own and
+/// SIFT features. Success is ending within 0.5 m and 10 degrees.
+#[derive(Args)]
+pub struct VisualTargetArgs {
+    /// Pairs of each difficulty.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pairs: u16,
+    /// Seed of the first flat; each pair has a flat of its own.
+    #[arg(long, default_value_t = 300_000)]
+    seed: u64,
+    /// Horizontal field of view of the camera that takes both views, degrees; the paper does not state its own.
+    #[arg(long, default_value_t = 120.0, value_name = "DEG", value_parser = field_of_view)]
+    hfov_deg: f64,
+    /// Least share of either view that the other must see; the paper assumes "some overlapping region".
+    #[arg(long, default_value_t = OVERLAP_MIN, value_name = "SHARE")]
+    overlap_min: f64,
+    /// The folder with the models and their manifest.json.
+    #[arg(long, default_value = "nodes/perception/models")]
+    models: PathBuf,
+    /// Pairs side by side; 0 for one per core.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Write the whole report here, as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write report.json and views.png here: start, target and final view of a success and a failure of each difficulty.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
+    // Known before the minutes are spent: can the report be written?
+    for path in args.json.iter().cloned().chain(args.out.iter().map(|folder| folder.join("report.json"))) {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let said = || format!("cannot write {}", path.display());
+        std::fs::create_dir_all(folder).with_context(said)?;
+        std::fs::File::options().create(true).append(true).open(&path).with_context(said)?;
+    }
+    let camera = Viewpoint { hfov_rad: args.hfov_deg.to_radians(), ..Viewpoint::default() };
+    let pairs = PairSpec { n_each: usize::from(args.pairs), seed: args.seed, camera, overlap_min: args.overlap_min };
+    let options = Options { pairs, methods: methods(&args.models), threads: args.threads };
+    let bar = ProgressBar::new(3 * u64::from(args.pairs)).with_style(style());
+    let report = bench(&options, &|(pair, runs): &PairRuns| {
+        bar.inc(1);
+        bar.set_message(format!("{}: {} of {} reached", pair.difficulty.name(), n_won(runs), runs.len()));
+    })?;
+    bar.finish_and_clear();
+    println!("{report}");
+    write(&args, &options, &report)?;
+    Ok(Ended::Well)
+}
+
+fn n_won(runs: &[PairRun]) -> usize {
+    runs.iter().filter(|run| run.success).count()
+}
+
+/// Features of a row, by what they are called in the manifest.
+const FEATURES: [(&str, &str, &str, Solver); 3] = [
+    ("R2D2-like, EPnP", "homing-r2d2", "mutual-nearest", Solver::Papers),
+    ("ours", "homing-extractor", "homing-matcher", Solver::Ours),
+    ("SIFT", "sift", "mutual-nearest", Solver::Ours),
+];
+
+/// All rows; those whose model is missing are left out with a word.
+fn methods(models: &Path) -> Vec<Method> {
+    let mut methods = Vec::new();
+    for (name, extractor, matcher, solver) in FEATURES {
+        match features(extractor, matcher, models) {
+            Ok(features) => methods.extend(rows(name, &features, solver)),
+            Err(cause) => eprintln!("the rows \"{name}\" are left out: {cause:#}"),
+        }
+    }
+    methods
+}
+
+fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {
+    let features = FeatureChoice {
+        extractor: ExtractorChoice::resolve(&ModelName::Listed(extractor.to_owned()), models)?,
+        matcher: MatcherChoice::resolve(&ModelName::Listed(matcher.to_owned()), models)?,
+        // Pairs side by side use the cores better than the threads of one.
+        run: RunConfig { threads: 1, ..RunConfig::default() },
+        ..FeatureChoice::default()
+    };
+    if features.uses_models() {
+        features.runtime()?;
+    }
+    Ok(features)
+}
+
+fn write(args: &VisualTargetArgs, options: &Options, report: &Report) -> anyhow::Result<()> {
+    let json = report.to_json()?;
+    if let Some(path) = &args.json {
+        std::fs::write(path, &json).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let Some(folder) = &args.out else { return Ok(()) };
+    let shown = shown(report);
+    let file = png(&contact_sheet(&shown, &options.pairs.camera)?)?;
+    for (name, bytes) in [("report.json", json.as_bytes()), ("views.png", &file)] {
+        std::fs::write(folder.join(name), bytes)
+            .with_context(|| format!("cannot write {name} in {}", folder.display()))?;
+    }
+    println!("\n{}: start, target and final view, from left to right", folder.join("views.png").display());
+    for (pair, run) in shown {
+        println!(
+            "  {} in flat {}, overlap {:.0} %: {}, ended {:.2} m and {:.1} deg off",
+            pair.difficulty.name(),
+            pair.flat,
+            100.0 * pair.overlap,
+            if run.success { "reached" } else { "not reached" },
+            run.final_distance_m,
+            run.final_heading_deg
+        );
+    }
+    Ok(())
+}
+
+/// The first success and the first failure of each difficulty, by the second row of our own features or the last of all.
+fn shown(report: &Report) -> Vec<(&TargetPair, &PairRun)> {
+    let ours = report.methods.iter().find(|m| m.name.starts_with("ours, multi")).or(report.methods.last());
+    let Some(ours) = ours else { return Vec::new() };
+    let runs: Vec<(&TargetPair, &PairRun)> = report.pairs.iter().zip(&ours.runs).collect();
+    let first = |difficulty: Difficulty, success: bool| {
+        runs.iter().find(move |(pair, run)| pair.difficulty == difficulty && run.success == success).copied()
+    };
+    Difficulty::ALL.into_iter().flat_map(|d| [first(d, true), first(d, false)]).flatten().collect()
+}
+
+fn style() -> ProgressStyle {
+    ProgressStyle::with_template("{bar:30} {pos}/{len} pairs  [{elapsed}, about {eta} left]  {wide_msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+}
