@@ -34,8 +34,6 @@ pub struct Gates {
     pub n_patches_min: usize,
     /// Smallest share of them that must look like the photo.
     pub patch_share_min: f64,
-    /// Largest shift of the drawn picture against the photo, radians.
-    pub patch_shift_rad_max: f64,
     /// Fewest verified matches of a bearing without depth: a line binds a match less than a point.
     pub n_bearing_min: usize,
     /// Smallest share of the matches that a bearing must explain.
@@ -46,15 +44,15 @@ impl Default for Gates {
     /// Between frames of two unrelated rooms (1,350 pairs, 45 matches each on average) at most 6 matches agreed on a
     /// pose; without depth (162 pairs) at most 14 and a third of the matches agreed on a bearing. Measured by the example
     /// `unrelated`. Things that are really there twice, such as two prints of one poster, agree in larger numbers: what
-    /// the patches are for. Of 400 views in flats 45 to 64, 4 named a wrong place with these gates.
+    /// the patches are for. Their share is what the example `proof` found on pairs of views of validation flats: of
+    /// the right poses it keeps 98 %, with depth that is not registered to the colour 95 %; of the wrong ones a third.
     fn default() -> Self {
         Self {
             n_inliers_min: 7,
             inlier_share_min: 0.1,
             error_rad_max: 0.008,
             n_patches_min: 12,
-            patch_share_min: 0.6,
-            patch_shift_rad_max: 0.05,
+            patch_share_min: 0.4,
             n_bearing_min: 25,
             bearing_share_min: 0.4,
         }
@@ -140,7 +138,6 @@ impl PerceptionConfig {
             ("error_rad_max", g.error_rad_max, (1e-5, 0.2), "0.00001..=0.2 rad"),
             ("n_patches_min", g.n_patches_min as f64, (0.0, 10_000.0), "0..=10000"),
             ("patch_share_min", g.patch_share_min, (0.0, 1.0), "0..=1"),
-            ("patch_shift_rad_max", g.patch_shift_rad_max, (0.0, 0.2), "0..=0.2 rad"),
             ("hypotheses_max", f64::from(self.hypotheses_max), (1.0, 100.0), "1..=100"),
             ("n_bearing_min", g.n_bearing_min as f64, (6.0, 10_000.0), "6..=10000"),
             ("bearing_share_min", g.bearing_share_min, (0.0, 1.0), "0..=1"),

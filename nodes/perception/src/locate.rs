@@ -15,7 +15,7 @@ use crate::pnp::{
     gravity_ransac, lo_ransac, refine, sling_heading,
 };
 use crate::seen_frame::SeenFrame;
-use crate::synthesis::{Likeness, Thumbnail, bears_out};
+use crate::synthesis::{Thumbnail, agreement};
 
 /// Radius of the search around a prediction, in units of the inlier gate: the first pose may be off by more than the
 /// noise of a keypoint.
@@ -124,13 +124,9 @@ fn proven_pose(
         let estimate =
             robust_pose(&correspondences, config, rng).and_then(|p| verified(p, &correspondences, config))?;
         let (pose, found) = guided_pose(views, &pairs, &estimate, config);
+        let agreement = agreement(&views.frame.seen, views.photo, views.goal_camera, &pose);
         let gates = &config.gates;
-        let likeness = Likeness {
-            n_patches_min: gates.n_patches_min,
-            share_min: gates.patch_share_min,
-            shift_rad: gates.patch_shift_rad_max,
-        };
-        if bears_out(&views.frame.seen, views.photo, views.goal_camera, &pose, &likeness) {
+        if agreement.n_patches >= gates.n_patches_min && agreement.share >= gates.patch_share_min {
             return Some(found);
         }
         // From the back, so that the indices before stay what they were; they ascend.

@@ -131,7 +131,7 @@ impl Planner {
     fn doubt(&mut self, pose: &PlanarPose) -> Doubt {
         let Some(best) = self.filter.best(self.state.step) else { return Doubt::None };
         let view = clear_view(self.mapper.map(), (pose.x_m, pose.y_m), (best.pose.x_m, best.pose.y_m));
-        self.filter.doubt(pose, view, self.state.step)
+        self.filter.doubt(pose, view, self.config.switches.n_inliers_min as f64, self.state.step)
     }
 
     fn hint(&mut self, pose: &PlanarPose, bearing_rad: f64, n_inliers: usize) {
