@@ -18,8 +18,8 @@ FORMAT = 1
 OVERLAP_CLASSES = ((0.10, 0.15), (0.20, 0.25), (0.35, 0.25), (0.55, 0.20), (0.75, 0.15))
 # Within a class, every 30 degrees of yaw difference or metre of distance makes a pair this much likelier.
 DIFFICULTY_GAIN = 0.5
-# Decoded files that each process keeps: at 320x240 about 3 GB, and decoding would otherwise cost a third of the time.
-FILES_CACHED = 16_000
+# Decoded files that each process keeps: at 320x240 about 4 GB, and decoding would otherwise cost a third of the time.
+FILES_CACHED = 24_000
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,16 @@ class PairSampler:
 
 @dataclass
 class Sample:
-    """Two training images (height x width, float32 grey 0 to 255) and how one maps to the other."""
+    """Two training images (height x width, float32 grey 0 to 255) and how one maps to the other.
+
+    `dense` says of every pixel of image a where in b it lands, and whether b sees it there.
+    """
 
     image_a: np.ndarray
     image_b: np.ndarray
     warp: Warp | None
     targets: ExtractorTargets | None
+    dense: tuple[np.ndarray, np.ndarray] | None = None
 
 
 class PairDataset(torch.utils.data.Dataset):
@@ -159,7 +163,7 @@ class PairDataset(torch.utils.data.Dataset):
         clean = [_warped(augment.random_grey(rgb, rng), h) for rgb, h in zip(rgbs, maps)]
         seen = [augment.photometric(image, rng) for image in clean]
         if self._task == "extractor":
-            return Sample(*seen, None, extractor_targets(*clean, warp, rng))
+            return Sample(*seen, None, extractor_targets(*clean, warp, rng), warp.dense())
         return Sample(*seen, warp, None)
 
 

@@ -11,6 +11,7 @@ from torch import nn
 
 CELL = 8
 DIMENSION = 64
+WIDE_DIMENSION = 128
 
 
 class Convolution(nn.Sequential):
@@ -25,7 +26,10 @@ class Convolution(nn.Sequential):
 
 
 class CornerMeasure(nn.Module):
-    """Logarithm of the structure tensor's smaller eigenvalue at every pixel, in units of the image's own contrast."""
+    """Logarithm of the structure tensor's smaller eigenvalue at every pixel, in units of the image's own contrast.
+
+    At two scales: a corner of noise is one at the fine scale alone.
+    """
 
     FLOOR = 1e-4
 
@@ -36,7 +40,10 @@ class CornerMeasure(nn.Module):
         self.register_buffer("sobel", sobel)
 
     def forward(self, image: torch.Tensor) -> torch.Tensor:
-        """n x 1 x h x w to the same shape."""
+        """n x 1 x h x w to n x 2 x h x w: fine, coarse."""
+        return torch.cat([self._measured(image), self._measured(box(box(image)))], 1)
+
+    def _measured(self, image: torch.Tensor) -> torch.Tensor:
         gradient = F.conv2d(F.pad(image, (1, 1, 1, 1), mode="replicate"), self.sobel)
         gx, gy = gradient[:, :1], gradient[:, 1:]
         # A box twice is a pyramid of 5x5, and cheaper.
@@ -52,39 +59,56 @@ class Extractor(nn.Module):
     def __init__(self):
         super().__init__()
         self.corner_measure = CornerMeasure()
-        self.front = Convolution(4, 16)
+        self.front = nn.Sequential(Convolution(4, 16), Convolution(16, 16))
         self.quarter = nn.Sequential(Convolution(16, 32, 2), Convolution(32, 32), Convolution(32, 32))
         self.eighth = nn.Sequential(Convolution(32, 64, 2), Convolution(64, 64))
         self.sixteenth = nn.Sequential(Convolution(64, 64, 2), Convolution(64, 64), Convolution(64, 64))
         self.thirty_second = nn.Sequential(
             Convolution(64, 96, 2), Convolution(96, 96), Convolution(96, 96), nn.Conv2d(96, 64, 1)
         )
-        self.fuse = nn.Sequential(Convolution(64, 64), Convolution(64, 64), nn.Conv2d(64, DIMENSION, 1))
+        self.fuse = nn.Sequential(Convolution(64, 64), Convolution(64, 64))
+        self.describe = nn.Conv2d(64, DIMENSION, 1)
+        # Longer descriptors for nearest neighbours without a matcher.
+        self.describe_wide = nn.Sequential(Convolution(64, 128), nn.Conv2d(128, WIDE_DIMENSION, 1))
         self.reliability = nn.Sequential(Convolution(64, 32, size=1), nn.Conv2d(32, 1, 1))
         # Detail at half resolution reaches the keypoint head by one product over each cell's 4x4 positions.
-        self.detail = nn.Conv2d(16, 64, 4, stride=4)
-        self.context = nn.Conv2d(64, 64, 1)
+        self.detail = nn.Conv2d(16, 96, 4, stride=4)
+        self.context = nn.Conv2d(64, 96, 1)
         self.keypoints = nn.Sequential(
-            nn.BatchNorm2d(64), nn.ReLU(inplace=True), Convolution(64, 64), nn.Conv2d(64, CELL * CELL + 1, 1)
+            nn.BatchNorm2d(96), nn.ReLU(inplace=True), Convolution(96, 96), nn.Conv2d(96, CELL * CELL + 1, 1)
         )
-        self.corner_gain = nn.Parameter(torch.ones(()))
+        self.corner_gain = nn.Parameter(torch.tensor([0.5, 0.5]))
         last = self.keypoints[-1]
         nn.init.zeros_(last.weight)
         nn.init.zeros_(last.bias)
 
     def forward(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Returns n x 65 x h/8 x w/8 logits, n x 64 x h/8 x w/8 unit descriptors, n x 1 x h/8 x w/8 logits."""
+        logits, features, reliability = self._features(image)
+        return logits, F.normalize(self.describe(features).float(), dim=1), reliability
+
+    def wide(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """The same with n x 128 x h/8 x w/8 unit descriptors."""
+        logits, features, reliability = self._features(image)
+        return logits, F.normalize(self.describe_wide(features).float(), dim=1), reliability
+
+    def both(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Logits, both kinds of descriptors, reliability logits: for training."""
+        logits, features, reliability = self._features(image)
+        descriptors = (F.normalize(head(features).float(), dim=1) for head in (self.describe, self.describe_wide))
+        return logits, *descriptors, reliability
+
+    def _features(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         image = self.normalised(image)
         half = self.front(F.pixel_unshuffle(image, 2))
         eighth = self.eighth(self.quarter(half))
         sixteenth = self.sixteenth(eighth)
         fused = eighth + enlarged(sixteenth, 2, eighth) + enlarged(self.thirty_second(sixteenth), 4, eighth)
-        descriptors = self.fuse(fused)
-        reliability = self.reliability(fused)
-        return self._keypoint_logits(image, half, eighth), F.normalize(descriptors.float(), dim=1), reliability
+        return self._keypoint_logits(image, half, eighth), self.fuse(fused), self.reliability(fused)
 
     def _keypoint_logits(self, image: torch.Tensor, half: torch.Tensor, eighth: torch.Tensor) -> torch.Tensor:
-        corners = F.pixel_unshuffle(self.corner_measure(image), CELL) * self.corner_gain
+        corners = (self.corner_measure(image) * self.corner_gain.view(1, 2, 1, 1)).sum(1, keepdim=True)
+        corners = F.pixel_unshuffle(corners, CELL)
         # The dustbin competes with a cell of weak texture: the response of a flat, noisy surface summed over 64 pixels.
         empty = torch.full_like(corners[:, :1], -1.0)
         prior = torch.cat([corners, empty], 1)
@@ -104,8 +128,8 @@ def box(x: torch.Tensor) -> torch.Tensor:
     if torch.onnx.is_in_onnx_export():
         return F.avg_pool2d(x, 3, 1, 1)
     x = F.pad(x, (1, 1, 1, 1))
-    rows = x[:, :, :-2] + x[:, :, 1:-1] + x[:, :, 2:]
-    return (rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / 9
+    rows = (x[:, :, :-2] + x[:, :, 1:-1]).add_(x[:, :, 2:])
+    return (rows[..., :-2] + rows[..., 1:-1]).add_(rows[..., 2:]).mul_(1 / 9)
 
 
 def enlarged(x: torch.Tensor, factor: int, like: torch.Tensor) -> torch.Tensor:
@@ -150,10 +174,10 @@ def sample_descriptors(descriptors: torch.Tensor, points: torch.Tensor) -> torch
 def select_keypoints(score: torch.Tensor, count: int, radius: int, threshold: float) -> tuple[torch.Tensor, torch.Tensor]:
     """The `count` strongest local maxima of n x 1 x h x w scores, strongest first.
 
-    Positions are refined to a part of a pixel. Returns pixels n x count x 2 and scores n x count; where there are fewer maxima above `threshold`, scores are 0.
+    Positions are refined to a part of a pixel. Returns pixels n x count x 2 and scores n x count; where there are fewer maxima above `threshold`,
+    scores are 0.
     """
-    side = 2 * radius + 1
-    largest = F.max_pool2d(F.max_pool2d(score, (side, 1), 1, (radius, 0)), (1, side), 1, (0, radius))
+    largest = _largest(_largest(score.detach(), radius, 2), radius, 3)
     border = torch.zeros_like(score)
     border[:, :, 4:-4, 4:-4] = 1
     peaks = torch.where((score >= largest) & (score > threshold), score, 0 * score) * border
@@ -161,6 +185,16 @@ def select_keypoints(score: torch.Tensor, count: int, radius: int, threshold: fl
     width = score.shape[3]
     pixels = torch.stack([flat % width, flat // width], 2).float()
     return pixels + _centroid(score, flat), values
+
+
+def _largest(x: torch.Tensor, radius: int, axis: int) -> torch.Tensor:
+    """The largest of each value and its neighbours along an axis: by shifts, as PyTorch's pooling is slow on a CPU."""
+    length = x.shape[axis]
+    padded = F.pad(x, (0, 0, radius, radius) if axis == 2 else (radius, radius, 0, 0), value=-torch.inf)
+    largest = padded.narrow(axis, 0, length)
+    for shift in range(1, 2 * radius + 1):
+        largest = torch.maximum(largest, padded.narrow(axis, shift, length))
+    return largest
 
 
 def _centroid(score: torch.Tensor, flat: torch.Tensor) -> torch.Tensor:

@@ -2,6 +2,7 @@
 
 import argparse
 import csv
+import math
 import os
 import time
 from contextlib import nullcontext
@@ -17,8 +18,7 @@ from .data import PairDataset, PairSet, loader
 
 CLIP_NORM = 2.0
 WARM_UP_STEPS = 60
-# The rate is constant, then falls to its last share over the last part: `--steps` may be raised before the fall begins.
-FALL_BEGINS, LAST_RATE = 0.65, 0.03
+LAST_RATE = 0.02
 LOG_EVERY_STEPS = 25
 
 
@@ -84,13 +84,11 @@ def autocast_from(device: torch.device, precision: str) -> Callable:
 
 
 def rate_at(step: int, steps: int, rate: float) -> float:
-    """Learning rate: warm-up, plateau, linear fall."""
+    """Learning rate: warm-up, then half a cosine down to its last share."""
     if step < WARM_UP_STEPS:
         return rate * (step + 1) / WARM_UP_STEPS
-    begin = FALL_BEGINS * steps
-    if step < begin:
-        return rate
-    return rate * (1 - (1 - LAST_RATE) * (step - begin) / max(1.0, steps - begin))
+    done = (step - WARM_UP_STEPS) / max(1, steps - WARM_UP_STEPS)
+    return rate * (LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * min(1.0, done))))
 
 
 def train(plan: Plan) -> None:
