@@ -2,20 +2,16 @@
 
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 import torch.nn.functional as F
 
-from .extractor import Extractor, heat_map, sample_descriptors
-from .keypoint_targets import IGNORED, NO_KEYPOINT, POINTS_MAX, ExtractorTargets
-from .repeatability import repeatability_losses
+from .extractor import Extractor, sample_descriptors
+from .keypoint_targets import POINTS_MAX, ExtractorTargets
 
 COSINE_SCALE = 20.0
 # Points this close to the true match show nearly the same patch: they are no counter-examples.
 AMBIGUOUS_PX = 10.0
-RELIABILITY_WEIGHT, KEYPOINT_WEIGHT, WIDE_WEIGHT = 0.5, 0.2, 0.5
-REPEATED_WEIGHT, PRECISE_WEIGHT = 3.0, 1.0
-NO_KEYPOINT_WEIGHT = 0.15
+RELIABILITY_WEIGHT, WIDE_WEIGHT = 0.5, 0.5
 
 
 @dataclass
@@ -30,7 +26,7 @@ def extractor_loss(model: Extractor, batch, autocast) -> tuple[torch.Tensor, dic
     targets = [s.targets for s in batch.samples]
     count = len(targets)
     with autocast():
-        logits, descriptors, wide, reliability = model.both(torch.cat([batch.images_a, batch.images_b]))
+        descriptors, wide, reliability = model.both(torch.cat([batch.images_a, batch.images_b]))
     points = _padded(targets, batch.images_a.device)
     excluded = _excluded(points)
     descriptor, probability, accuracy = _descriptor_loss(descriptors[:count], descriptors[count:], points, excluded)
@@ -39,14 +35,9 @@ def extractor_loss(model: Extractor, batch, autocast) -> tuple[torch.Tensor, dic
         _reliability_loss(reliability[:count], points.a, probability, points.weights)
         + _reliability_loss(reliability[count:], points.b, probability, points.weights)
     )
-    labels = np.stack([t.labels_a for t in targets] + [t.labels_b for t in targets])
-    keypoint = _keypoint_loss(logits.float(), torch.from_numpy(labels).to(logits.device))
-    heat = heat_map(logits)
-    repeated, imprecise = repeatability_losses(heat[:count], heat[count:], [s.dense for s in batch.samples])
     loss = descriptor + WIDE_WEIGHT * descriptor_wide + RELIABILITY_WEIGHT * trust
-    loss = loss + KEYPOINT_WEIGHT * keypoint + REPEATED_WEIGHT * repeated + PRECISE_WEIGHT * imprecise
-    parts = {"descriptor": descriptor, "wide": descriptor_wide, "reliability": trust, "keypoint": keypoint}
-    parts |= {"repeated": repeated, "imprecise": imprecise, "top1": accuracy, "top1_wide": accuracy_wide}
+    parts = {"descriptor": descriptor, "wide": descriptor_wide, "reliability": trust}
+    parts |= {"top1": accuracy, "top1_wide": accuracy_wide}
     return loss, {name: float(value.detach()) for name, value in parts.items()}
 
 
@@ -94,10 +85,3 @@ def _reliability_loss(logits: torch.Tensor, points: torch.Tensor, probability: t
     )[:, 0, 0]
     entropy = F.binary_cross_entropy_with_logits(sampled, probability, reduction="none")
     return (entropy * weights).sum() / weights.sum().clamp(min=1)
-
-
-def _keypoint_loss(logits: torch.Tensor, labels: torch.Tensor) -> torch.Tensor:
-    """Cross entropy per 8x8 cell, empty cells counting little."""
-    class_weights = torch.ones(NO_KEYPOINT + 1, device=logits.device)
-    class_weights[NO_KEYPOINT] = NO_KEYPOINT_WEIGHT
-    return F.cross_entropy(logits, labels, class_weights, ignore_index=IGNORED)

@@ -6,7 +6,6 @@ Conventions: pixels are (x, y) with the centre of the top-left pixel at (0, 0); 
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 # A projected point agrees with the depth it lands on within this share of the depth, or this many metres.
@@ -61,20 +60,6 @@ class Warp:
         inside = in_bounds(points_b, self.shape_b)
         # A point that leaves the training image is known to have no counterpart, whatever the depth says there.
         return points_b, agrees & inside, known | ~inside
-
-    def dense(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where every pixel of image a lands in b (height x width x 2, float32), and whether b sees it there (height x width).
-
-        `points` for all pixels at once, in single precision.
-        """
-        native_a = _pixels(self.shape_a, np.linalg.inv(self.h_a))
-        if self.same_view:
-            native_b, visible = native_a, _inside(native_a, self.a.depth_m.shape)
-        else:
-            native_b, visible = _reproject_dense(self.a, self.b, native_a)
-        points_b = _transformed(self.h_b, native_b)
-        visible &= _inside(points_b, self.shape_b)
-        return np.where(visible[..., None], points_b, np.float32(-1e3)), visible
 
     def on_depth_edge(self, points_a: np.ndarray) -> np.ndarray:
         """Which of n x 2 points of image a lie where depth jumps: their surface, and so their depth, is ambiguous."""
@@ -147,56 +132,6 @@ def reproject(a: View, b: View, native_a: np.ndarray) -> tuple[np.ndarray, np.nd
     tolerance = np.maximum(DEPTH_AGREEMENT_M, DEPTH_AGREEMENT_SHARE * z)
     agrees = known & known_b & inside & (np.abs(depth_b - z) < tolerance)
     return native_b, agrees, known & (known_b | ~inside)
-
-
-def _pixels(shape: tuple[int, int], h: np.ndarray) -> np.ndarray:
-    """All pixels of an image, carried by a homography: height x width x 2."""
-    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
-    return _transformed(h, np.stack([x, y], 2))
-
-
-def _transformed(h: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """`transform_points` of height x width x 2 points in single precision."""
-    if np.array_equal(h, np.eye(3)):
-        return points
-    return cv2.perspectiveTransform(points, h)
-
-
-def _inside(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    x, y = points[..., 0], points[..., 1]
-    return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)
-
-
-def _reproject_dense(a: View, b: View, native_a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`reproject` of height x width x 2 native pixels: pixels of b, and which of them show the same smooth surface."""
-    inverse_a, known = _inverse_depth_at(a.depth_m, native_a)
-    z_a = 1 / np.maximum(inverse_a, np.float32(1e-3))
-    t = np.linalg.inv(b.t_world_camera) @ a.t_world_camera
-    x, y = (native_a[..., 0] - a.k[0, 2]) / a.k[0, 0] * z_a, (native_a[..., 1] - a.k[1, 2]) / a.k[1, 1] * z_a
-    x, y, z_a = (v.astype(np.float32, copy=False) for v in (x, y, z_a))
-    x_b, y_b, z_b = (np.float32(r[0]) * x + np.float32(r[1]) * y + np.float32(r[2]) * z_a + np.float32(r[3]) for r in t[:3])
-    known &= z_b > 0.05
-    z = np.where(known, z_b, np.float32(1.0))
-    u = np.float32(b.k[0, 0]) * x_b / z + np.float32(b.k[0, 2])
-    v = np.float32(b.k[1, 1]) * y_b / z + np.float32(b.k[1, 2])
-    native_b = np.where(known[..., None], np.stack([u, v], 2), np.float32(-1e4))
-    known &= _inside(native_b, b.depth_m.shape)
-    inverse_b, known_b = _inverse_depth_at(b.depth_m, native_b)
-    tolerance = np.maximum(np.float32(DEPTH_AGREEMENT_M), np.float32(DEPTH_AGREEMENT_SHARE) * z)
-    return native_b, known & known_b & (np.abs(1 / np.maximum(inverse_b, np.float32(1e-3)) - z) < tolerance)
-
-
-def _inverse_depth_at(depth_m: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolated inverse depth at height x width x 2 pixels, and where it is known and smooth."""
-    valid = depth_m > 0
-    inverse = np.where(valid, 1 / np.maximum(depth_m, np.float32(1e-3)), np.float32(0))
-    bend = np.zeros_like(inverse)
-    bend[:, 1:-1] = np.abs(inverse[:, 2:] - 2 * inverse[:, 1:-1] + inverse[:, :-2])
-    bend[1:-1] = np.maximum(bend[1:-1], np.abs(inverse[2:] - 2 * inverse[1:-1] + inverse[:-2]))
-    sound = (valid & (bend < np.float32(EDGE_CURVATURE) * inverse)).astype(np.float32)
-    x, y = np.ascontiguousarray(points[..., 0]), np.ascontiguousarray(points[..., 1])
-    value = cv2.remap(inverse, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return value, cv2.remap(sound, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT) > 0.99
 
 
 def relative_pose_error(t_estimate: np.ndarray, t_truth: np.ndarray) -> tuple[float, float]:
