@@ -23,6 +23,7 @@ from .rgbd_folder import rgbd_pairs
 INLIER_SHARE_OF_WIDTH = 3 / 640
 RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 2000, 0.9999
 MATCH_CORRECT_PX_AT_640 = 5.0
+MODERATE = "overlap>=0.3_yaw<=60deg"
 # The descriptors that a method compares.
 FEATURES = {"mutual": "narrow", "wide": "wide", "fast": "narrow", "accurate": "narrow"}
 TOLERANCES = {"0.25m_10deg": (0.25, 10.0), "0.1m_5deg": (0.10, 5.0), "0.1m_2deg": (0.10, 2.0)}
@@ -155,11 +156,12 @@ def correct_matches(pair: PosedPair, points_a: np.ndarray, points_b: np.ndarray)
 
 
 def _summary(rows: list[dict], pairs: list[PosedPair]) -> dict:
-    moderate = [p.overlap >= 0.3 and p.yaw_deg <= 60 for p in pairs]
-    return {
-        "all": _shares(rows),
-        "overlap>=0.3_yaw<=60deg": _shares([row for row, keep in zip(rows, moderate) if keep]),
-    }
+    return {"all": _shares(rows), MODERATE: _shares([row for row, pair in zip(rows, pairs) if is_moderate(pair)])}
+
+
+def is_moderate(pair: PosedPair) -> bool:
+    """Whether the pair is one of those that a navigator meets near its goal."""
+    return pair.overlap >= 0.3 and pair.yaw_deg <= 60
 
 
 def _shares(rows: list[dict]) -> dict:

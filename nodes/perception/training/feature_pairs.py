@@ -76,7 +76,8 @@ class FeaturePairs:
         else:
             pair = chosen.pairs.pairs[self._samplers[which].draw(rng)]
             views = (pair.a, pair.b) if rng.random() < 0.5 else (pair.b, pair.a)
-        versions = rng.integers(chosen.features.versions, size=2)
+        # One version against itself would be too easy.
+        versions = rng.permutation(chosen.features.versions)[:2] if same else rng.integers(chosen.features.versions, size=2)
         a, b = (chosen.features.of(index[id(v)], n, KEYPOINT_THRESHOLD, count) for v, n in zip(views, versions))
         geometry = [v.geometry() for v in views]
         shapes = [g.depth_m.shape for g in geometry]

@@ -33,7 +33,7 @@ def main() -> None:
     parser.add_argument("--extractor", type=Path, required=True, help="checkpoint of the trained extractor")
     parser.add_argument("--data", type=Path, required=True, help="exported pair set")
     parser.add_argument("--out", type=Path, required=True, help="folder for the keypoints")
-    parser.add_argument("--versions", type=int, default=2, help="of each view")
+    parser.add_argument("--versions", type=int, default=2, help="of each view, at least 2")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--part", default="0/1", help="which part of the views, of how many")
     parser.add_argument("--threads", type=int, default=1)
