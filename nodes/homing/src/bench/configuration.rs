@@ -17,14 +17,15 @@ const SOLVERS: [(&str, PoseSolver); 4] = [
 
 /// Reads a configuration. Models are names of the manifest in `models`, or CONTRACT=FILE.
 pub fn setup(text: &str, models: &Path) -> anyhow::Result<Setup> {
-    let mut parts = text.split(',');
+    let (knobs, label) = text.split_once(",label=").unwrap_or((text, text));
+    let mut parts = knobs.split(',');
     let features = parts.next().unwrap_or_default();
     let (extractor, matcher) = match features.split_once('+') {
         Some((extractor, matcher)) => (extractor, Some(matcher)),
         None => (features, None),
     };
     let mut setup = Setup {
-        name: text.to_owned(),
+        name: label.to_owned(),
         features: FeatureChoice {
             extractor: ExtractorChoice::resolve(&model(extractor)?, models)?,
             matcher: match matcher {
@@ -78,8 +79,7 @@ fn turn(setup: &mut Setup, key: &str, value: &str) -> anyhow::Result<()> {
         }
         "ratio" => setup.perception.ratio_max = value.parse()?,
         "confidence" => setup.features.matcher_config.confidence_min = value.parse()?,
-        "label" => setup.name = value.to_owned(),
-        _ => bail!("{key:?} is none of solver, keypoints, ratio, confidence, label"),
+        _ => bail!("{key:?} is none of solver, keypoints, ratio, confidence; a label comes last"),
     }
     Ok(())
 }
@@ -92,10 +92,10 @@ mod tests {
     #[test]
     fn a_word_says_it_all() {
         let none = Path::new("/nowhere");
-        let s = setup("sift,solver=epnp-ransac,keypoints=500,ratio=0.7,label=as in the papers", none).unwrap();
+        let s = setup("sift,solver=epnp-ransac,keypoints=500,ratio=0.7,label=SIFT, as in the papers", none).unwrap();
         assert_eq!((s.features.extractor.name(), s.features.matcher.name()), ("sift", "mutual-nearest"));
         assert_eq!((s.perception.solver, s.perception.sift.keypoints_max), (PoseSolver::EpnpRansac, 500));
-        assert_eq!((s.perception.ratio_max, s.name.as_str()), (0.7, "as in the papers"));
+        assert_eq!((s.perception.ratio_max, s.name.as_str()), (0.7, "SIFT, as in the papers"));
         let s = setup("sift+dual-softmax,confidence=0.4", none).unwrap();
         assert_eq!((s.features.matcher.name(), s.features.matcher_config.confidence_min), ("dual-softmax", 0.4));
         let wrong = |text: &str| format!("{:#}", setup(text, none).err().unwrap());

@@ -67,7 +67,7 @@ pub struct PerceptionArgs {
     /// Threads of models and OpenCV while time is measured; 0 for one per core.
     #[arg(long, default_value_t = 0)]
     timing_threads: u16,
-    /// Pairs timed, one after the other, once accuracy has been measured.
+    /// Pairs timed, one after the other, once accuracy has been measured; 0 for none.
     #[arg(long, default_value_t = 60)]
     timing_pairs: usize,
     /// Write the figures here.
@@ -80,7 +80,7 @@ pub struct PerceptionArgs {
 
 const EXAMPLES: &str = "\
 A configuration is EXTRACTOR[+MATCHER], and after commas: solver=lo-ransac | gravity |
-epnp-ransac | sling-heading, keypoints=N, ratio=R, confidence=C, label=TEXT.
+epnp-ransac | sling-heading, keypoints=N, ratio=R, confidence=C, and last label=TEXT.
 Extractor and matcher are names as `homing models` lists them, or CONTRACT=FILE.
 Without a matcher: the model of the extractor's name, else mutual-nearest.
 
@@ -106,7 +106,10 @@ pub fn run(args: PerceptionArgs) -> anyhow::Result<Ended> {
     let bar = ProgressBar::new(task.n_pairs as u64).with_style(style());
     let measured = measure(&*task.source, &setups, &task.options, &|n| bar.inc(n as u64))?;
     bar.set_message("measuring time");
-    let stages = time_stages(&*task.source, &setups, threads(args.timing_threads)?, args.timing_pairs)?;
+    let stages = match args.timing_pairs {
+        0 => Vec::new(),
+        n => time_stages(&*task.source, &setups, threads(args.timing_threads)?, n)?,
+    };
     bar.finish_and_clear();
     if measured.pairs.is_empty() {
         bail!("there are no pairs to measure: give more seeds or other gaps");

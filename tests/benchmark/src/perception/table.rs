@@ -46,7 +46,7 @@ fn share(s: &Share) -> String {
 fn accuracy_table(f: &mut fmt::Formatter<'_>, rows: &[Accuracy]) -> fmt::Result {
     let [a, b, c] = TOLERANCES.map(|t| t.words());
     writeln!(f, "  {:34}{:>6}  AUC @5   @10   @20  {a:24}{b:24}{c:24}medians", "", "pairs")?;
-    for row in rows {
+    for row in rows.iter().filter(|row| row.n > 0) {
         let medians = match (row.position_m_median, row.rotation_deg_median) {
             (Some(m), Some(deg)) => format!("{m:.3} m  {deg:.2} deg"),
             _ => "-".to_owned(),
@@ -94,13 +94,17 @@ impl PerceptionReport {
         let Some((_, first)) = all.first() else { return Ok(()) };
         writeln!(
             f,
-            "\nms a frame, p50 (p95) of {} frames, {} threads{:13}extract         match          pose         total",
-            first.n, first.threads, ""
+            "\n{:50}{:>16}{:>16}{:>16}{:>16}",
+            format!("ms a frame, p50 (p95) of {} frames, {} threads", first.n, first.threads),
+            "extract",
+            "match",
+            "pose",
+            "total"
         )?;
         for (name, s) in &all {
             let cell = |m: &Milliseconds| format!("{:.1} ({:.1})", m.p50, m.p95);
             let [a, b, c, d] = [&s.extract_ms, &s.match_ms, &s.pose_ms, &s.total_ms].map(cell);
-            writeln!(f, "  {name:48}{a:>14}{b:>14}{c:>14}{d:>14}")?;
+            writeln!(f, "  {name:48}{a:>16}{b:>16}{c:>16}{d:>16}")?;
         }
         writeln!(f, "One after the other, the configurations in turn; the photo's features are at hand.")
     }
