@@ -197,7 +197,7 @@ fn malformed_states() {
         M::to_domain,
         &[
             ("mode 6", |m| m.mode = 6),
-            ("action 5", |m| m.action = 5),
+            ("action 6", |m| m.action = 6),
             ("yaw_rad is NaN", |m| m.yaw_rad = f64::NAN),
             ("x_m is inf", |m| m.goal_x_m = f64::INFINITY),
             ("goal_covariance is NaN", |m| m.goal_covariance[8] = f64::NAN),

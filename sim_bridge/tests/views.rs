@@ -11,7 +11,7 @@ use homing_sim::flat::{Detail, generate_as};
 use homing_sim::nav_grid::NavGrid;
 use homing_sim::views::export::{Export, ExportError};
 use homing_sim::views::record::{FlatRecord, SetRecord, files};
-use homing_sim::views::{self, FlatViews, OVERLAP_MIN, View, ViewSpec, agrees, overlap};
+use homing_sim::views::{self, Cameras, FlatViews, OVERLAP_MIN, View, ViewSpec, agrees, overlap};
 
 const SMALL: ViewSpec = ViewSpec { n_views: 6, width: 160, height: 120 };
 
@@ -212,4 +212,19 @@ fn folders_of_others_are_left_alone() {
     assert!(matches!(on_a_file, ExportError::Write { .. }), "{on_a_file}");
     let no_image = Export::open(&new_folder("export_no_image"), 3..5, ViewSpec { width: 0, ..SMALL }).unwrap();
     assert!(matches!(no_image.run(1, &|_| {}), Err(ExportError::Views { .. })));
+}
+
+#[test]
+fn the_robots_own_camera_is_level_and_always_the_same() {
+    let spec = ViewSpec { n_views: 4, width: 160, height: 120 };
+    let flat = views::draw_with(200_001, &spec, &Cameras::ROBOT).unwrap();
+    assert_eq!(flat.views.len(), 4);
+    for view in &flat.views {
+        assert!((view.camera.hfov_rad().to_degrees() - 120.0).abs() < 1e-9);
+        let forward = view.t_world_camera.rotation() * nalgebra::Vector3::z();
+        assert!(forward.z.abs() < 1e-12, "level: {forward}");
+        let floor_m = flat.views[0].t_world_camera.translation().z;
+        assert_eq!(view.t_world_camera.translation().z, floor_m);
+    }
+    assert_eq!(views::draw_with(200_001, &SMALL, &Cameras::Drawn).unwrap(), views::draw(200_001, &SMALL).unwrap());
 }

@@ -14,6 +14,11 @@ pub enum Action {
     TurnLeft,
     /// One turn to the right, clockwise.
     TurnRight,
+    /// The last turn to the goal's heading, finer than a whole one; left positive.
+    Face {
+        /// Thousandths of a radian: whole numbers, so that actions stay comparable.
+        milliradians: i32,
+    },
     /// Arrived: end the episode here.
     Stop,
     /// Stand still and wait: something that is needed is missing or stale.
@@ -28,6 +33,7 @@ impl Action {
             Action::Forward => Motion::Forward { distance_m: forward_m },
             Action::TurnLeft => Motion::Turn { angle_rad: turn_rad },
             Action::TurnRight => Motion::Turn { angle_rad: -turn_rad },
+            Action::Face { milliradians } => Motion::Turn { angle_rad: f64::from(milliradians) * 1e-3 },
             Action::Stop => Motion::Stop { done: true },
             Action::Hold => Motion::Stop { done: false },
         }

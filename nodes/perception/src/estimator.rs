@@ -4,13 +4,14 @@ use std::time::{Duration, Instant};
 
 use homing_core::{
     FeatureExtractor, Features, GoalEstimate, GoalPhoto, MatchedPoint, Matcher, RgbImage, RgbdFrame, Sighting,
-    StageTimes, UnseenReason,
+    StageTimes, Stamp, UnseenReason,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::locate::{Found, Views, locate};
-use crate::synthesis::{Seen, Thumbnail};
+use crate::seen_frame::SeenFrame;
+use crate::synthesis::Thumbnail;
 use crate::{MutualNearest, PerceptionConfig, PerceptionError, Sift};
 
 /// Verified matches handed on for people to look at.
@@ -93,29 +94,49 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
         self.goal.as_ref().map(|goal| &goal.features)
     }
 
-    /// Where the goal is, seen from this frame (SLING 3.3). The same frame and goal give the same estimate.
+    /// Where the goal is, seen from this frame (SLING 3.3): [`Self::look`], then [`Self::register`]. The same frame and goal give the same estimate.
     ///
     /// # Errors
     /// Faults of the extractor, the matcher or OpenCV; never what the image shows.
     pub fn estimate(&mut self, frame: &RgbdFrame) -> Result<GoalEstimate, PerceptionError> {
+        if self.goal.is_none() {
+            return Ok(unseen(frame.stamp));
+        }
+        self.estimate_and_keep(frame).map(|(estimate, _)| estimate)
+    }
+
+    /// The same, and what to remember of the frame.
+    ///
+    /// # Errors
+    /// As [`Self::estimate`].
+    pub fn estimate_and_keep(&mut self, frame: &RgbdFrame) -> Result<(GoalEstimate, SeenFrame), PerceptionError> {
+        let mut extract = Duration::ZERO;
+        let seen = timed(&mut extract, || self.look(frame))?;
+        let mut estimate = self.register(&seen)?;
+        estimate.times.extract = extract;
+        Ok((estimate, seen))
+    }
+
+    /// The first half of [`Self::estimate`], which needs no goal: keypoints, and their points in metres.
+    ///
+    /// # Errors
+    /// Faults of the extractor; never what the image shows.
+    pub fn look(&mut self, frame: &RgbdFrame) -> Result<SeenFrame, PerceptionError> {
+        let features = self.extract(&frame.rgb)?;
+        Ok(SeenFrame::new(frame, features, &self.config.depth))
+    }
+
+    /// The second half: where the goal is, seen from a frame looked at now or long ago.
+    ///
+    /// # Errors
+    /// Faults of the matcher or OpenCV; never what the image shows.
+    pub fn register(&mut self, frame: &SeenFrame) -> Result<GoalEstimate, PerceptionError> {
         let mut times = StageTimes::default();
-        let Some(goal_id) = self.goal.as_ref().map(|goal| goal.photo.id) else {
-            return Ok(unseen(frame, 0, UnseenReason::NoGoal));
-        };
-        let query = timed(&mut times.extract, || self.extract(&frame.rgb))?;
-        let Some(goal) = &self.goal else { return Ok(unseen(frame, 0, UnseenReason::NoGoal)) };
-        let matches = timed(&mut times.matching, || self.matcher.match_features(&query, &goal.features))
+        let Some(goal) = &self.goal else { return Ok(unseen(frame.stamp)) };
+        let query = &frame.features;
+        let matches = timed(&mut times.matching, || self.matcher.match_features(query, &goal.features))
             .map_err(|source| stage(self.matcher.name(), source))?;
-        let grey = frame.rgb.to_luma();
-        let views = Views {
-            query: &query,
-            goal: &goal.features,
-            depth: &frame.depth,
-            camera: &frame.intrinsics,
-            goal_camera: &goal.photo.intrinsics,
-            seen: Seen { grey: &grey, depth: &frame.depth, camera: &frame.intrinsics },
-            photo: &goal.thumbnail,
-        };
+        let views = Views { frame, goal: &goal.features, goal_camera: &goal.photo.intrinsics, photo: &goal.thumbnail };
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed ^ frame.stamp.0);
         let Found { sighting, verified } = timed(&mut times.pose, || locate(&views, &matches, &self.config, &mut rng))?;
         let matched_points = verified.iter().take(MATCHED_POINTS_MAX).map(|&(q, g)| MatchedPoint {
@@ -124,7 +145,7 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
         });
         Ok(GoalEstimate {
             stamp: frame.stamp,
-            goal_id,
+            goal_id: goal.photo.id,
             sighting,
             n_matches: matches.len(),
             matched_points: matched_points.collect(),
@@ -141,11 +162,11 @@ fn stage(name: &str, source: impl core::error::Error + Send + Sync + 'static) ->
     PerceptionError::Stage { name: name.to_owned(), source: Box::new(source) }
 }
 
-fn unseen(frame: &RgbdFrame, goal_id: u64, reason: UnseenReason) -> GoalEstimate {
+fn unseen(stamp: Stamp) -> GoalEstimate {
     GoalEstimate {
-        stamp: frame.stamp,
-        goal_id,
-        sighting: Sighting::NotSeen { reason },
+        stamp,
+        goal_id: 0,
+        sighting: Sighting::NotSeen { reason: UnseenReason::NoGoal },
         n_matches: 0,
         matched_points: Vec::new(),
         times: StageTimes::default(),

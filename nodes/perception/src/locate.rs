@@ -2,20 +2,20 @@
 
 use std::collections::BTreeSet;
 
-use homing_core::{DepthImage, FeatureMatch, Features, Intrinsics, Sighting, Transform, UnseenReason};
-use nalgebra::{Matrix6, Point3, Unit, Vector3, Vector6};
+use homing_core::{FeatureMatch, Features, Intrinsics, Sighting, Transform, UnseenReason};
+use nalgebra::{Matrix6, Unit, Vector3, Vector6};
 use rand::Rng;
 
 use crate::PerceptionError;
 use crate::config::{PerceptionConfig, PoseSolver};
 use crate::essential::{EssentialConfig, RayPair, bearing};
 use crate::guided::{Scene, guided_matches, similarity};
-use crate::lift::lift;
 use crate::pnp::{
     CameraPose, Correspondence, EPNP_GATE_PX, PoseEstimate, RansacConfig, Upright, covariance, epnp_ransac,
     gravity_ransac, lo_ransac, refine, sling_heading,
 };
-use crate::synthesis::{Seen, Thumbnail, agreement};
+use crate::seen_frame::SeenFrame;
+use crate::synthesis::{Thumbnail, agreement};
 
 /// Radius of the search around a prediction, in units of the inlier gate: the first pose may be off by more than the
 /// noise of a keypoint.
@@ -23,12 +23,9 @@ const GUIDED_WINDOW: f64 = 1.5;
 
 /// Everything known about the two images.
 pub(crate) struct Views<'a> {
-    pub query: &'a Features,
+    pub frame: &'a SeenFrame,
     pub goal: &'a Features,
-    pub depth: &'a DepthImage,
-    pub camera: &'a Intrinsics,
     pub goal_camera: &'a Intrinsics,
-    pub seen: Seen<'a>,
     pub photo: &'a Thumbnail,
 }
 
@@ -46,7 +43,7 @@ pub(crate) fn locate(
     rng: &mut impl Rng,
 ) -> Result<Found, PerceptionError> {
     let n_min = config.gates.n_inliers_min;
-    if views.query.keypoints.len().min(views.goal.keypoints.len()) < n_min {
+    if views.frame.features.keypoints.len().min(views.goal.keypoints.len()) < n_min {
         return Ok(unseen(UnseenReason::NoTexture));
     }
     let matches = distinct(views, matches.iter().map(|m| (m.query, m.goal)));
@@ -79,14 +76,17 @@ fn found_bearing(
 ) -> Result<Option<Found>, PerceptionError> {
     let rays: Vec<RayPair> = pairs
         .iter()
-        .map(|&(q, g)| RayPair { query: ray(views.camera, &views.query.keypoints[q]), goal: views.goal_ray(g) })
+        .map(|&(q, g)| RayPair {
+            query: ray(&views.frame.camera, &views.frame.features.keypoints[q]),
+            goal: views.goal_ray(g),
+        })
         .collect();
     let sd_px = config.keypoint_sd_px;
     let essential = EssentialConfig {
         gate_rad: config.gates.error_rad_max,
         confidence: config.confidence,
         iterations_max: five_point_samples(config),
-        ray_sd_rad: sd_px * (views.camera.fx().powi(-2) + views.goal_camera.fx().powi(-2)).sqrt(),
+        ray_sd_rad: sd_px * (views.frame.camera.fx().powi(-2) + views.goal_camera.fx().powi(-2)).sqrt(),
     };
     let Some(estimate) = bearing(&rays, &essential)? else { return Ok(None) };
     let n_inliers = estimate.inliers.len();
@@ -124,7 +124,7 @@ fn proven_pose(
         let estimate =
             robust_pose(&correspondences, config, rng).and_then(|p| verified(p, &correspondences, config))?;
         let (pose, found) = guided_pose(views, &pairs, &estimate, config);
-        let agreement = agreement(&views.seen, views.photo, views.goal_camera, &pose);
+        let agreement = agreement(&views.frame.seen, views.photo, views.goal_camera, &pose);
         let gates = &config.gates;
         if agreement.n_patches >= gates.n_patches_min && agreement.share >= gates.patch_share_min {
             return Some(found);
@@ -146,9 +146,10 @@ fn guided_pose(
     config: &PerceptionConfig,
 ) -> (CameraPose, Found) {
     let similarity_min = weakest_of_most(views, first.inliers.iter().map(|&i| pairs[i]));
-    let points: Vec<_> = (0..views.query.keypoints.len()).filter_map(|q| Some((q, views.point(q, config)?))).collect();
+    let points: Vec<_> =
+        (0..views.frame.features.keypoints.len()).filter_map(|q| Some((q, views.frame.points[q]?))).collect();
     let goal_rays: Vec<_> = (0..views.goal.keypoints.len()).map(|g| views.goal_ray(g).into_inner()).collect();
-    let scene = Scene { query: views.query, goal: views.goal, points: &points, goal_rays: &goal_rays };
+    let scene = Scene { query: &views.frame.features, goal: views.goal, points: &points, goal_rays: &goal_rays };
     let mut best = (first.pose, found_pose(pairs, first));
     let mut pose = first.pose;
     let mut n_best = first.inliers.len();
@@ -169,7 +170,7 @@ fn guided_pose(
 
 /// Similarity that nine in ten of the verified pairs reach.
 fn weakest_of_most(views: &Views<'_>, pairs: impl Iterator<Item = (usize, usize)>) -> f32 {
-    let mut similarities: Vec<f32> = pairs.map(|pair| similarity(views.query, views.goal, pair)).collect();
+    let mut similarities: Vec<f32> = pairs.map(|pair| similarity(&views.frame.features, views.goal, pair)).collect();
     similarities.sort_by(f32::total_cmp);
     similarities.get(similarities.len() / 10).copied().unwrap_or(1.0)
 }
@@ -181,18 +182,13 @@ fn distinct(views: &Views<'_>, pairs: impl Iterator<Item = (usize, usize)>) -> V
         ((2.0 * k.x_px).round() as i32, (2.0 * k.y_px).round() as i32)
     };
     let mut seen = BTreeSet::new();
-    pairs.filter(|&(q, g)| seen.insert((cell(views.query, q), cell(views.goal, g)))).collect()
+    pairs.filter(|&(q, g)| seen.insert((cell(&views.frame.features, q), cell(views.goal, g)))).collect()
 }
 
 impl Views<'_> {
     /// Unit ray of a goal keypoint, goal camera frame.
     pub(crate) fn goal_ray(&self, g: usize) -> Unit<Vector3<f64>> {
         ray(self.goal_camera, &self.goal.keypoints[g])
-    }
-
-    /// Point of a query keypoint, camera frame, if its depth can be trusted.
-    pub(crate) fn point(&self, q: usize, config: &PerceptionConfig) -> Option<Point3<f64>> {
-        lift(&self.query.keypoints[q], self.depth, self.camera, &config.depth)
     }
 
     /// The pairs whose query keypoint has a trusted depth, and what they mean.
@@ -205,11 +201,11 @@ impl Views<'_> {
     }
 
     fn correspondence(&self, (q, g): (usize, usize), config: &PerceptionConfig) -> Option<Correspondence> {
-        let point = self.point(q, config)?;
+        let point = (*self.frame.points.get(q)?)?;
         Some(Correspondence {
             point,
             depth_sd_m: config.depth.sd(point.z),
-            direction_sd_rad: config.keypoint_sd_px / self.camera.fx(),
+            direction_sd_rad: config.keypoint_sd_px / self.frame.camera.fx(),
             ray: self.goal_ray(g),
             ray_sd_rad: config.keypoint_sd_px / self.goal_camera.fx(),
         })

@@ -3,7 +3,7 @@
 use homing_core::{GoalEstimate, GoalPhoto, RgbdFrame};
 
 use crate::onnx::{AnyExtractor, AnyMatcher, FeatureChoice, Parts};
-use crate::{GoalEstimator, MutualNearest, PerceptionConfig, PerceptionError, Sift};
+use crate::{GoalEstimator, MutualNearest, PerceptionConfig, PerceptionError, SeenFrame, Sift};
 
 /// An estimator with whatever features a configuration chose.
 pub type AnyEstimator = GoalEstimator<AnyExtractor, AnyMatcher>;
@@ -82,10 +82,41 @@ impl ResilientEstimator {
     /// # Errors
     /// Faults of SIFT or OpenCV; never those of a model.
     pub fn estimate(&mut self, frame: &RgbdFrame) -> Result<GoalEstimate, PerceptionError> {
-        match self.estimator.estimate(frame) {
+        self.resiliently(|estimator| estimator.estimate(frame))
+    }
+
+    /// The same, and what to remember of the frame.
+    ///
+    /// # Errors
+    /// As [`Self::estimate`].
+    pub fn estimate_and_keep(&mut self, frame: &RgbdFrame) -> Result<(GoalEstimate, SeenFrame), PerceptionError> {
+        self.resiliently(|estimator| estimator.estimate_and_keep(frame))
+    }
+
+    /// See [`GoalEstimator::look`].
+    ///
+    /// # Errors
+    /// As [`Self::estimate`].
+    pub fn look(&mut self, frame: &RgbdFrame) -> Result<SeenFrame, PerceptionError> {
+        self.resiliently(|estimator| estimator.look(frame))
+    }
+
+    /// See [`GoalEstimator::register`]. SIFT cannot take over here: the frame's features are those of the model.
+    ///
+    /// # Errors
+    /// Faults of the matcher or OpenCV.
+    pub fn register(&mut self, frame: &SeenFrame) -> Result<GoalEstimate, PerceptionError> {
+        self.estimator.register(frame)
+    }
+
+    fn resiliently<T>(
+        &mut self,
+        work: impl Fn(&mut AnyEstimator) -> Result<T, PerceptionError>,
+    ) -> Result<T, PerceptionError> {
+        match work(&mut self.estimator) {
             Err(fault) if self.gives_way_to(&fault) => {
                 self.degrade(&fault, self.estimator.goal().cloned())?;
-                self.estimator.estimate(frame)
+                work(&mut self.estimator)
             }
             done => done,
         }

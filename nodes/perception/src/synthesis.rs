@@ -2,7 +2,7 @@
 //! goal camera would see it, and compared with the photo. Two rooms with one wallpaper agree on hundreds of keypoints; they
 //! do not agree on what stands in front of it.
 
-use homing_core::{DepthImage, Intrinsics, RgbImage};
+use homing_core::{Intrinsics, RgbImage, RgbdFrame};
 
 use crate::pnp::CameraPose;
 
@@ -57,13 +57,37 @@ impl Thumbnail {
     }
 }
 
-/// What the robot sees, as far as drawing it from elsewhere needs it.
-#[derive(Copy, Clone)]
-pub(crate) struct Seen<'a> {
-    /// Grey, row-major, of the size of `depth`.
-    pub grey: &'a [u8],
-    pub depth: &'a DepthImage,
-    pub camera: &'a Intrinsics,
+/// What the robot sees, as far as drawing it from elsewhere needs it: every few pixels in both directions.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    camera: Intrinsics,
+    samples: Vec<Sample>,
+}
+
+/// One pixel with depth.
+#[derive(Copy, Clone, Debug)]
+struct Sample {
+    u: u16,
+    v: u16,
+    depth_m: f32,
+    grey: u8,
+}
+
+impl Seen {
+    pub fn of(frame: &RgbdFrame) -> Self {
+        let (width, height) = (frame.depth.width(), frame.depth.height());
+        let grey = frame.rgb.to_luma();
+        let step = (width.max(height) / SAMPLES).max(1) as usize;
+        let mut samples = Vec::new();
+        for v in (0..height).step_by(step) {
+            for u in (0..width).step_by(step) {
+                if let (Some(depth_m), Some(&grey)) = (frame.depth.at(u, v), grey.get((v * width + u) as usize)) {
+                    samples.push(Sample { u: u as u16, v: v as u16, depth_m, grey });
+                }
+            }
+        }
+        Self { camera: frame.intrinsics, samples }
+    }
 }
 
 /// How well frame and photo agree.
@@ -76,7 +100,7 @@ pub(crate) struct Agreement {
 }
 
 /// Compares the photo with the frame seen from `pose`.
-pub(crate) fn agreement(seen: &Seen<'_>, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Agreement {
+pub(crate) fn agreement(seen: &Seen, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Agreement {
     let drawn = draw(seen, photo, goal_camera, pose);
     let (mut n_patches, mut n_same) = (0, 0);
     for row in (0..photo.rows.saturating_sub(PATCH - 1)).step_by(STRIDE) {
@@ -93,21 +117,16 @@ pub(crate) fn agreement(seen: &Seen<'_>, photo: &Thumbnail, goal_camera: &Intrin
 }
 
 /// Mean grey of what the frame shows in each cell of the photo; what is nearer to the goal camera hides what is behind.
-fn draw(seen: &Seen<'_>, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Vec<Option<f64>> {
+fn draw(seen: &Seen, photo: &Thumbnail, goal_camera: &Intrinsics, pose: &CameraPose) -> Vec<Option<f64>> {
     let mut nearest_m = vec![f64::INFINITY; photo.grey.len()];
     let mut points = Vec::new();
-    let (width, height) = (seen.depth.width(), seen.depth.height());
-    let step = (width.max(height) / SAMPLES).max(1) as usize;
-    for v in (0..height).step_by(step) {
-        for u in (0..width).step_by(step) {
-            let Some(depth_m) = seen.depth.at(u, v) else { continue };
-            let point = seen.camera.unproject(f64::from(u), f64::from(v), f64::from(depth_m));
-            let at_goal = pose.to_goal(&point);
-            let Some(pixel) = goal_camera.project(&at_goal.into()) else { continue };
-            let Some(cell) = photo.at(pixel.x, pixel.y) else { continue };
-            nearest_m[cell] = nearest_m[cell].min(at_goal.z);
-            points.push((cell, at_goal.z, f64::from(seen.grey[(v * width + u) as usize])));
-        }
+    for sample in &seen.samples {
+        let point = seen.camera.unproject(f64::from(sample.u), f64::from(sample.v), f64::from(sample.depth_m));
+        let at_goal = pose.to_goal(&point);
+        let Some(pixel) = goal_camera.project(&at_goal.into()) else { continue };
+        let Some(cell) = photo.at(pixel.x, pixel.y) else { continue };
+        nearest_m[cell] = nearest_m[cell].min(at_goal.z);
+        points.push((cell, at_goal.z, f64::from(sample.grey)));
     }
     let mut sums = vec![(0.0, 0.0); photo.grey.len()];
     for (cell, z_m, grey) in points {
@@ -137,6 +156,9 @@ fn compare(cells: impl Iterator<Item = (f64, f64)>) -> Option<bool> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
+    use std::sync::Arc;
+
+    use homing_core::{DepthImage, Stamp};
     use nalgebra::{Matrix3, Vector3};
 
     use super::*;
@@ -164,7 +186,7 @@ mod tests {
         let camera = Intrinsics::from_hfov(320, 240, 2.0).unwrap();
         let (rgb, depth) = wall(&camera, Vector3::zeros(), seeds.0);
         let (photo, _) = wall(&camera, at_goal, seeds.1);
-        let seen = Seen { grey: &rgb.to_luma(), depth: &depth, camera: &camera };
+        let seen = Seen::of(&RgbdFrame::new(Stamp(0), Arc::new(rgb), Arc::new(depth), camera).unwrap());
         agreement(&seen, &Thumbnail::of(&photo), &camera, &CameraPose { r: Matrix3::identity(), p: said })
     }
 

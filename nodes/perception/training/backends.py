@@ -8,22 +8,30 @@ import torch
 
 from .extractor import ExportedExtractor, keypoint_score, sample_descriptors, select_keypoints
 from .matcher import ExportedMatcher, normalised_points
-from .matcher_loss import NMS_RADIUS
-from .train_matcher import load_extractor, load_matcher
+from .keypoint_set import NMS_RADIUS
+from .train_extractor import load_extractor
+from .train_matcher import load_matcher
 
 KEYPOINT_THRESHOLD = 0.002
 DUAL_SOFTMAX_SCALE, DUAL_SOFTMAX_CONFIDENCE = 20.0, 0.1
-SIFT_RATIO = 0.8
+SIFT_RATIO, WIDE_RATIO = 0.8, 0.95
 
 
-def runner(path: Path):
-    """A function from tensors to a tuple of tensors: a checkpoint's network or an exported model on onnxruntime."""
+def extractor_runner(path: Path, kind: str):
+    """A function from an image (1 x 1 x h x w) to heat map, descriptors (`kind`: narrow or wide) and reliability."""
     if path.suffix == ".onnx":
         return _onnx_runner(path)
-    state = torch.load(path, map_location="cpu", weights_only=True)
-    if state["name"] == "extractor":
-        return torch.no_grad()(ExportedExtractor(load_extractor(path, torch.device("cpu"))[0]).eval())
-    return torch.no_grad()(ExportedMatcher(load_matcher(path, torch.device("cpu"))[0]).eval())
+    extractor, _ = load_extractor(path, torch.device("cpu"))
+    return torch.no_grad()(ExportedExtractor(extractor, kind).eval())
+
+
+def matcher_runner(path: Path, fast: bool):
+    """A function from two images' keypoints to matches and confidences; a checkpoint's first layers if `fast`."""
+    if path.suffix == ".onnx":
+        return _onnx_runner(path)
+    matcher, _ = load_matcher(path, torch.device("cpu"))
+    layers = matcher.config.fast_layers if fast else matcher.config.layers
+    return torch.no_grad()(ExportedMatcher(matcher, layers).eval())
 
 
 def _onnx_runner(path: Path):
@@ -42,10 +50,10 @@ def _onnx_runner(path: Path):
 
 
 class LearnedFeatures:
-    """Keypoints (k x 2), descriptors (k x 64) and scores (k) of a grey image, strongest first."""
+    """Keypoints (k x 2), descriptors (k x 64 or 128) and scores (k) of a grey image, strongest first."""
 
-    def __init__(self, path: Path, count: int):
-        self._run, self._count = runner(path), count
+    def __init__(self, path: Path, count: int, kind: str = "narrow"):
+        self._run, self._count = extractor_runner(path, kind), count
 
     def __call__(self, image: np.ndarray) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         height, width = image.shape
@@ -63,8 +71,8 @@ class LearnedFeatures:
 class LearnedMatcher:
     """Matching pixels (n x 2 of either image) by the matcher."""
 
-    def __init__(self, path: Path, confidence: float):
-        self._run, self._confidence = runner(path), confidence
+    def __init__(self, path: Path, confidence: float, fast: bool):
+        self._run, self._confidence = matcher_runner(path, fast), confidence
 
     def __call__(self, a, b, shape_a, shape_b) -> tuple[np.ndarray, np.ndarray]:
         if not len(a[0]) or not len(b[0]):
@@ -85,6 +93,18 @@ def dual_softmax_matches(a, b) -> tuple[np.ndarray, np.ndarray]:
     best, partner = probability.max(1)
     mutual = probability.argmax(0)[partner] == torch.arange(len(partner))
     chosen = mutual & (best > DUAL_SOFTMAX_CONFIDENCE)
+    return a[0][chosen].numpy().astype(np.float64), b[0][partner[chosen]].numpy().astype(np.float64)
+
+
+def ratio_matches(a, b) -> tuple[np.ndarray, np.ndarray]:
+    """Mutual nearest neighbours that pass a ratio test, as paper 2's pipeline takes them: descriptors without a matcher."""
+    if len(a[0]) < 2 or len(b[0]) < 2:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    cosine = a[1] @ b[1].T
+    (best, second), (partner, _) = (x.T for x in cosine.topk(2, 1))
+    mutual = cosine.argmax(0)[partner] == torch.arange(len(partner))
+    # Distances of unit vectors: d^2 = 2 - 2 cos.
+    chosen = mutual & ((1 - best) < WIDE_RATIO**2 * (1 - second))
     return a[0][chosen].numpy().astype(np.float64), b[0][partner[chosen]].numpy().astype(np.float64)
 
 

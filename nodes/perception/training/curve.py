@@ -8,19 +8,20 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .evaluate import as_text, measure_all, validation_pairs
+from .evaluate import MODERATE, as_text, is_moderate, measure_all, validation_pairs
 
-PLOTTED = ("0.25m_10deg", "0.1m_5deg", "matching_accuracy")
+PLOTTED = ("0.25m_10deg", "0.1m_2deg", "matching_accuracy")
 
 
 def write_curve(options: argparse.Namespace) -> None:
     """Measures snapshots of every run in `options.curve`; writes OUT.json, OUT.csv and OUT.png."""
-    pairs = list(validation_pairs(options))
-    rows = [{"run": "SIFT", "step": 0, "pairs_seen": 0, "minutes": 0.0} | _flat(measure_all(["sift"], pairs, options)["sift"])]
+    pairs = [pair for pair in validation_pairs(options) if is_moderate(pair)]
+    sift = measure_all(["sift"], pairs, options)["sift"][MODERATE]
+    rows = [{"run": "SIFT", "step": 0, "pairs_seen": 0, "minutes": 0.0} | sift]
     for run in options.curve:
         for path in _spread(sorted((run / "snapshots").glob("*.pt")), options.points):
-            rows.append(_row(run, path, pairs, options))
-            print(as_text({f"{run.name} {rows[-1]['step']}": {"all": rows[-1]}}), flush=True)
+            rows += _rows(path, pairs, options)
+            print(as_text({f"{rows[-1]['run']} {rows[-1]['step']}": {MODERATE: rows[-1]}}), flush=True)
     out = options.out or Path("curve.json")
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(rows, indent=1) + "\n")
@@ -31,19 +32,17 @@ def write_curve(options: argparse.Namespace) -> None:
     _plot(rows, out.with_suffix(".png"))
 
 
-def _row(run: Path, path: Path, pairs, options: argparse.Namespace) -> dict:
+def _rows(path: Path, pairs, options: argparse.Namespace) -> list[dict]:
+    """One row for each way in which a snapshot is used."""
     state = torch.load(path, map_location="cpu", weights_only=True)
     chosen = argparse.Namespace(**vars(options))
     if state["name"] == "extractor":
-        chosen.extractor, method = path, "mutual"
+        chosen.extractor, methods = path, ["mutual", "wide"]
     else:
-        chosen.matcher, method = path, "matcher"
-    facts = {"run": run.name, "step": state["step"], "pairs_seen": state["pairs"], "minutes": round(state["seconds"] / 60, 1)}
-    return facts | _flat(measure_all([method], pairs, chosen)[method])
-
-
-def _flat(summary: dict) -> dict:
-    return summary["all"]
+        chosen.matcher, methods = path, ["fast", "accurate"]
+    facts = {"step": state["step"], "pairs_seen": state["pairs"], "minutes": round(state["seconds"] / 60, 1)}
+    measured = measure_all(methods, pairs, chosen)
+    return [{"run": f"{state['name']}, {method}"} | facts | measured[method][MODERATE] for method in methods]
 
 
 def _spread(paths: list[Path], count: int) -> list[Path]:

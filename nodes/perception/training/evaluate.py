@@ -13,7 +13,7 @@ import torch
 from tqdm import tqdm
 
 from . import augment
-from .backends import LearnedFeatures, LearnedMatcher, Sift, dual_softmax_matches, sift_matches
+from .backends import LearnedFeatures, LearnedMatcher, Sift, dual_softmax_matches, ratio_matches, sift_matches
 from .data import PairSampler, PairSet
 from .geometry import Warp, relative_pose_error
 from .posed_pair import PosedPair
@@ -23,6 +23,9 @@ from .rgbd_folder import rgbd_pairs
 INLIER_SHARE_OF_WIDTH = 3 / 640
 RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 2000, 0.9999
 MATCH_CORRECT_PX_AT_640 = 5.0
+MODERATE = "overlap>=0.3_yaw<=60deg"
+# The descriptors that a method compares.
+FEATURES = {"mutual": "narrow", "wide": "wide", "fast": "narrow", "accurate": "narrow"}
 TOLERANCES = {"0.25m_10deg": (0.25, 10.0), "0.1m_5deg": (0.10, 5.0), "0.1m_2deg": (0.10, 2.0)}
 
 
@@ -50,8 +53,8 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--rgbd", type=Path, help="instead: a folder of posed RGB-D frames, for the last measurement only")
     parser.add_argument("--gap", type=int, default=10, help="frames between the two of a pair, with --rgbd")
     parser.add_argument("--extractor", type=Path, help="checkpoint (.pt) or exported model (.onnx)")
-    parser.add_argument("--matcher", type=Path, help="checkpoint (.pt) or exported model (.onnx)")
-    parser.add_argument("--methods", default="sift,mutual,matcher", help="of sift, mutual, matcher")
+    parser.add_argument("--matcher", type=Path, help="checkpoint (.pt) or exported model (.onnx), for fast and accurate")
+    parser.add_argument("--methods", default="sift,mutual,fast,accurate", help="of sift, mutual, wide, fast, accurate")
     parser.add_argument("--limit", type=int, default=400, help="pairs measured")
     parser.add_argument("--keypoints", type=int, default=1024)
     parser.add_argument("--confidence", type=float, default=0.2, help="least confidence of a match by the matcher")
@@ -81,21 +84,28 @@ def validation_pairs(options: argparse.Namespace):
 
 def measure_all(methods: list[str], pairs: list[PosedPair], options: argparse.Namespace) -> dict:
     """Per method: the share of pairs solved and the quality of the matches, over all pairs and over the moderate ones."""
-    learned = LearnedFeatures(options.extractor, options.keypoints) if {"mutual", "matcher"} & set(methods) else None
-    matcher = LearnedMatcher(options.matcher, options.confidence) if "matcher" in methods else None
-    sift = Sift(options.keypoints)
+    match = {method: _matches_by(method, options) for method in methods}
+    needed = {kind for method in methods if (kind := FEATURES.get(method))}
+    learned = {kind: LearnedFeatures(options.extractor, options.keypoints, kind) for kind in needed}
     results = {method: [] for method in methods}
     for pair in tqdm(pairs, desc="pairs", unit="pair", mininterval=5):
-        features = [learned(image) for image in pair.images] if learned else None
+        features = {kind: [found(image) for image in pair.images] for kind, found in learned.items()}
         for method in methods:
-            if method == "sift":
-                points = sift_matches(*(sift(image) for image in pair.images))
-            elif method == "mutual":
-                points = dual_softmax_matches(*features)
-            else:
-                points = matcher(*features, pair.images[0].shape, pair.images[1].shape)
-            results[method].append(measure(pair, *points))
+            results[method].append(measure(pair, *match[method](pair, features)))
     return {method: _summary(rows, pairs) for method, rows in results.items()}
+
+
+def _matches_by(method: str, options: argparse.Namespace):
+    """A function from a pair and its features of either kind to matching pixels."""
+    if method == "sift":
+        sift = Sift(options.keypoints)
+        return lambda pair, _: sift_matches(*(sift(image) for image in pair.images))
+    if method == "mutual":
+        return lambda _, features: dual_softmax_matches(*features["narrow"])
+    if method == "wide":
+        return lambda _, features: ratio_matches(*features["wide"])
+    matcher = LearnedMatcher(options.matcher, options.confidence, fast=method == "fast")
+    return lambda pair, features: matcher(*features["narrow"], pair.images[0].shape, pair.images[1].shape)
 
 
 def measure(pair: PosedPair, points_a: np.ndarray, points_b: np.ndarray) -> dict:
@@ -146,11 +156,12 @@ def correct_matches(pair: PosedPair, points_a: np.ndarray, points_b: np.ndarray)
 
 
 def _summary(rows: list[dict], pairs: list[PosedPair]) -> dict:
-    moderate = [p.overlap >= 0.3 and p.yaw_deg <= 60 for p in pairs]
-    return {
-        "all": _shares(rows),
-        "overlap>=0.3_yaw<=60deg": _shares([row for row, keep in zip(rows, moderate) if keep]),
-    }
+    return {"all": _shares(rows), MODERATE: _shares([row for row, pair in zip(rows, pairs) if is_moderate(pair)])}
+
+
+def is_moderate(pair: PosedPair) -> bool:
+    """Whether the pair is one of those that a navigator meets near its goal."""
+    return pair.overlap >= 0.3 and pair.yaw_deg <= 60
 
 
 def _shares(rows: list[dict]) -> dict:

@@ -14,13 +14,16 @@ import numpy as np
 import onnxruntime
 import torch
 
+from .exported import ExportedR2d2
 from .extractor import ExportedExtractor
 from .matcher import ExportedMatcher
-from .train_matcher import load_extractor, load_matcher
+from .train_extractor import load_extractor
+from .train_matcher import load_matcher
 
 OPSET = 18
 LICENCE = "Apache-2.0 OR MIT"
 IMAGE_INPUTS, IMAGE_OUTPUTS = ["image"], ["heat_map", "descriptors", "reliability"]
+WIDE_OUTPUTS = ["descriptors", "reliability", "repeatability"]
 MATCH_INPUTS = ["keypoints0", "descriptors0", "scores0", "keypoints1", "descriptors1", "scores1"]
 MATCH_OUTPUTS = ["matches0", "confidences0"]
 
@@ -30,14 +33,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--extractor", type=Path, required=True)
     parser.add_argument("--matcher", type=Path)
+    parser.add_argument("--confidence", type=float, default=0.2, help="least confidence of a match, chosen on validation")
     parser.add_argument("--accuracy", type=Path, action="append", default=[], help="JSON that training.evaluate wrote")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "models")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     accuracy = {path.stem: json.loads(path.read_text()) for path in options.accuracy}
     entries = [export_extractor(options.extractor, options.out, accuracy)]
+    entries.append(export_wide(options.extractor, options.out, accuracy))
     if options.matcher:
-        entries.append(export_matcher(options.matcher, options.out, accuracy, entries[0]))
+        for name in ("homing-matcher", "homing-matcher-accurate"):
+            entries.append(export_matcher(name, options, accuracy, entries[0]))
     manifest = {"format": 1, "grey": "0.299 R + 0.587 G + 0.114 B, 0 to 255", "models": entries}
     (options.out / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
     print(f"{sum(e['bytes'] for e in entries) / 1e6:.2f} MB in {options.out}")
@@ -57,7 +63,7 @@ def export_extractor(checkpoint: Path, out: Path, accuracy: dict) -> dict:
     contract = {
         "inputs": {"image": "1 x 1 x H x W float32 grey, 0 to 255; H and W multiples of 32"},
         "outputs": {
-            "heat_map": "1 x 1 x H x W keypoint probability",
+            "heat_map": "1 x 1 x H x W strength of a keypoint",
             "descriptors": "1 x 64 x H/8 x W/8, unit length over the channels; sample at ((x + 0.5) / 8 - 0.5), renormalise",
             "reliability": "1 x 1 x H/8 x W/8 probability; score of a keypoint = heat_map x bilinear reliability",
         },
@@ -69,11 +75,35 @@ def export_extractor(checkpoint: Path, out: Path, accuracy: dict) -> dict:
     return _entry("homing-extractor", "extractor", path, facts, accuracy, contract, milliseconds)
 
 
-def export_matcher(checkpoint: Path, out: Path, accuracy: dict, extractor_entry: dict) -> dict:
-    """Writes homing_matcher.onnx; returns its manifest entry, which names the extractor it belongs to."""
-    matcher, facts = load_matcher(checkpoint, torch.device("cpu"))
-    model = ExportedMatcher(matcher).eval()
-    path = out / "homing_matcher.onnx"
+def export_wide(checkpoint: Path, out: Path, accuracy: dict) -> dict:
+    """Writes homing_r2d2.onnx, the same keypoints with 128-d descriptors under contract "r2d2"; returns its manifest entry."""
+    extractor, facts = load_extractor(checkpoint, torch.device("cpu"))
+    model = ExportedR2d2(extractor).eval().to(memory_format=torch.contiguous_format)
+    path = out / "homing_r2d2.onnx"
+    axes = {"image": {2: "height", 3: "width"}, "descriptors": {2: "height_8", 3: "width_8"}}
+    axes |= {name: {2: "height", 3: "width"} for name in ("reliability", "repeatability")}
+    _write(model, (_colours(480, 640),), path, IMAGE_INPUTS, WIDE_OUTPUTS, axes)
+    for height, width in ((480, 640), (256, 320)):
+        _check(model, path, (_colours(height, width),), IMAGE_INPUTS, tolerance=2e-3)
+    milliseconds = _time(path, (_colours(480, 640),), IMAGE_INPUTS, "640x480")
+    contract = {
+        "contract": "r2d2",
+        "inputs": {"image": "1 x 3 x H x W float32, (RGB / 255 - ImageNet's mean) / ImageNet's deviation; multiples of 32"},
+        "outputs": {
+            "descriptors": "1 x 128 x H/8 x W/8, unit length over the channels; sample at ((x + 0.5) / 8 - 0.5), renormalise",
+            "reliability": "1 x 1 x H x W, 0.7 to 1",
+            "repeatability": "1 x 1 x H x W, 0 to 1, 0 except at local maxima over 5x5; keypoints from 0.7",
+        },
+    }
+    return _entry("homing-r2d2", "extractor", path, facts, accuracy, contract, milliseconds)
+
+
+def export_matcher(name: str, options: argparse.Namespace, accuracy: dict, extractor_entry: dict) -> dict:
+    """Writes the first layers of the matcher, or all, by its name; returns its manifest entry, which names its extractor."""
+    matcher, facts = load_matcher(options.matcher, torch.device("cpu"))
+    layers = matcher.config.layers if name.endswith("accurate") else matcher.config.fast_layers
+    model = ExportedMatcher(matcher, layers).eval()
+    path = options.out / f"{name.replace('-', '_')}.onnx"
     axes = {name: {0: f"count{name[-1]}"} for name in MATCH_INPUTS}
     axes |= {name: {0: "count0"} for name in MATCH_OUTPUTS}
     _write(model, _keypoints(512, 500), path, MATCH_INPUTS, MATCH_OUTPUTS, axes)
@@ -88,11 +118,12 @@ def export_matcher(checkpoint: Path, out: Path, accuracy: dict, extractor_entry:
         },
         "outputs": {
             "matches0": "N0 int64: index into keypoints1, -1 if the two are not each other's best",
-            "confidences0": "N0 float32, 0 to 1; keep above 0.2",
+            "confidences0": "N0 float32, probability of the match",
         },
         "at_least": "1 keypoint in either image",
     }
-    entry = _entry("homing-matcher", "matcher", path, facts, accuracy, contract, milliseconds)
+    contract["confidence_min"], contract["layers"] = options.confidence, layers
+    entry = _entry(name, "matcher", path, facts, accuracy, contract, milliseconds)
     return entry | {"extractor": extractor_entry["name"], "extractor_sha256": extractor_entry["sha256"]}
 
 
@@ -104,6 +135,11 @@ def _image(height: int, width: int) -> torch.Tensor:
         coarse = rng.uniform(0, 85, (-(-height // step), -(-width // step))).astype(np.float32)
         total += np.kron(coarse, np.ones((step, step), np.float32))[:height, :width]
     return torch.from_numpy(total)[None, None]
+
+
+def _colours(height: int, width: int) -> torch.Tensor:
+    """The same in three channels, normalised as contract "r2d2" asks."""
+    return (_image(height, width).repeat(1, 3, 1, 1) / 255 - 0.45) / 0.225
 
 
 def _keypoints(count_a: int, count_b: int) -> tuple[torch.Tensor, ...]:

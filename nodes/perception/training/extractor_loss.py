@@ -2,18 +2,16 @@
 
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 import torch.nn.functional as F
 
 from .extractor import Extractor, sample_descriptors
-from .keypoint_targets import IGNORED, NO_KEYPOINT, POINTS_MAX, ExtractorTargets
+from .keypoint_targets import POINTS_MAX, ExtractorTargets
 
 COSINE_SCALE = 20.0
 # Points this close to the true match show nearly the same patch: they are no counter-examples.
 AMBIGUOUS_PX = 10.0
-RELIABILITY_WEIGHT, KEYPOINT_WEIGHT = 0.5, 0.5
-NO_KEYPOINT_WEIGHT = 0.15
+RELIABILITY_WEIGHT, WIDE_WEIGHT = 0.5, 0.5
 
 
 @dataclass
@@ -28,17 +26,18 @@ def extractor_loss(model: Extractor, batch, autocast) -> tuple[torch.Tensor, dic
     targets = [s.targets for s in batch.samples]
     count = len(targets)
     with autocast():
-        logits, descriptors, reliability = model(torch.cat([batch.images_a, batch.images_b]))
+        descriptors, wide, reliability = model.both(torch.cat([batch.images_a, batch.images_b]))
     points = _padded(targets, batch.images_a.device)
-    descriptor, probability, accuracy = _descriptor_loss(descriptors[:count], descriptors[count:], points)
+    excluded = _excluded(points)
+    descriptor, probability, accuracy = _descriptor_loss(descriptors[:count], descriptors[count:], points, excluded)
+    descriptor_wide, _, accuracy_wide = _descriptor_loss(wide[:count], wide[count:], points, excluded)
     trust = 0.5 * (
         _reliability_loss(reliability[:count], points.a, probability, points.weights)
         + _reliability_loss(reliability[count:], points.b, probability, points.weights)
     )
-    labels = np.stack([t.labels_a for t in targets] + [t.labels_b for t in targets])
-    keypoint, repeated = _keypoint_loss(logits.float(), torch.from_numpy(labels).to(logits.device))
-    loss = descriptor + RELIABILITY_WEIGHT * trust + KEYPOINT_WEIGHT * keypoint
-    parts = {"descriptor": descriptor, "reliability": trust, "keypoint": keypoint, "top1": accuracy, "repeated": repeated}
+    loss = descriptor + WIDE_WEIGHT * descriptor_wide + RELIABILITY_WEIGHT * trust
+    parts = {"descriptor": descriptor, "wide": descriptor_wide, "reliability": trust}
+    parts |= {"top1": accuracy, "top1_wide": accuracy_wide}
     return loss, {name: float(value.detach()) for name, value in parts.items()}
 
 
@@ -54,16 +53,21 @@ def _padded(targets: list[ExtractorTargets], device) -> _Points:
     return _Points(a.to(device), b.to(device), weights.to(device))
 
 
-def _descriptor_loss(a: torch.Tensor, b: torch.Tensor, points: _Points):
-    """Negative log of the dual softmax at the true matches; also each point's match probability and the top-1 share."""
-    da, db = sample_descriptors(a, points.a), sample_descriptors(b, points.b)
-    similarity = COSINE_SCALE * da @ db.transpose(1, 2)
+def _excluded(points: _Points) -> torch.Tensor:
+    """Which pairs of points say nothing of descriptors: the padding, and neighbours of the true match."""
     present = points.weights > 0
-    diagonal = torch.eye(POINTS_MAX, dtype=torch.bool, device=da.device)
+    diagonal = torch.eye(POINTS_MAX, dtype=torch.bool, device=points.a.device)
     near_a = torch.cdist(points.a, points.a) < AMBIGUOUS_PX
     near_b = torch.cdist(points.b, points.b) < AMBIGUOUS_PX
     outside = ~(present[:, :, None] & present[:, None, :])
-    similarity = similarity.masked_fill(((near_a | near_b) & ~diagonal) | outside, -1e4)
+    return ((near_a | near_b) & ~diagonal) | outside
+
+
+def _descriptor_loss(a: torch.Tensor, b: torch.Tensor, points: _Points, excluded: torch.Tensor):
+    """Negative log of the dual softmax at the true matches; also each point's match probability and the top-1 share."""
+    da, db = sample_descriptors(a, points.a), sample_descriptors(b, points.b)
+    similarity = (COSINE_SCALE * da @ db.transpose(1, 2)).masked_fill(excluded, -1e4)
+    present = points.weights > 0
     log_rows, log_columns = F.log_softmax(similarity, 2), F.log_softmax(similarity, 1)
     log_match = (log_rows + log_columns).diagonal(dim1=1, dim2=2)
     total = points.weights.sum().clamp(min=1)
@@ -81,13 +85,3 @@ def _reliability_loss(logits: torch.Tensor, points: torch.Tensor, probability: t
     )[:, 0, 0]
     entropy = F.binary_cross_entropy_with_logits(sampled, probability, reduction="none")
     return (entropy * weights).sum() / weights.sum().clamp(min=1)
-
-
-def _keypoint_loss(logits: torch.Tensor, labels: torch.Tensor):
-    """Cross entropy per 8x8 cell, empty cells counting little; also the share of keypoint cells that are right."""
-    class_weights = torch.ones(NO_KEYPOINT + 1, device=logits.device)
-    class_weights[NO_KEYPOINT] = NO_KEYPOINT_WEIGHT
-    loss = F.cross_entropy(logits, labels, class_weights, ignore_index=IGNORED)
-    filled = (labels != NO_KEYPOINT) & (labels != IGNORED)
-    right = (logits.argmax(1) == labels) & filled
-    return loss, right.sum() / filled.sum().clamp(min=1)

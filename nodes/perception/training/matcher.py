@@ -1,34 +1,41 @@
 """The matcher: which keypoints of two images show the same point, if any.
 
-SuperGlue's formulation (Sarlin et al. 2020): keypoints exchange messages by self and cross attention over descriptors and
-positions, and a partial assignment is found by optimal transport with dustbins. What makes it fit a CPU: 64 dimensions;
-self attention to the strongest keypoints only; attention by cosine with a bounded temperature, so that one exponential
-serves both directions of a cross layer (LightGlue shares the similarity, here its exponential too); values that carry
-positions, so that a cross layer says where a point went; and Sinkhorn by matrix-vector products at inference.
-Before training it matches as a dual softmax over the descriptors does: every layer begins as the identity.
+Self and cross attention over descriptors and positions (SuperGlue, Sarlin et al. 2020), with relative positions in self
+attention and a double softmax with matchabilities instead of optimal transport (LightGlue, Lindenberger et al. 2023). What
+makes it fit a CPU: 64 dimensions; self attention to the strongest keypoints only; and one similarity, bounded so that its
+exponential needs no protection, which serves both directions of a cross layer and is at once an assignment. So every layer
+can be the last: a fast matcher is the first layers of an accurate one.
+
+A cross layer also says in plain numbers where a keypoint would go, how surely, and how alone it is: its neighbours then learn
+from it how the scene moved. The similarity compares where a keypoint is expected with where one is, beside descriptors.
 """
 
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
 import torch
-import torch.nn.functional as F
 from torch import nn
 
-# exp() of a cosine times this still sums in single precision, whatever the other terms.
-TEMPERATURE_MAX = 30.0
+# exp() of a similarity up to this, squared, still is a number in single precision.
+TEMPERATURE_MAX = 40.0
+# Numbers that a cross layer says in plain: own position, position of the partner, the way between, sureness, loneliness.
+PLAIN = 8
 
 
 @dataclass(frozen=True)
 class MatcherConfig:
     """Size of a matcher."""
 
+    descriptor: int = 64
     dimension: int = 64
     heads: int = 2
-    layers: int = 3
+    layers: int = 6
+    # The fast matcher ends after this layer.
+    fast_layers: int = 3
     # Self attention looks at this many of the strongest keypoints: keypoints come strongest first.
     anchors: int = 256
-    sinkhorn_iterations: int = 5
+    # Channels of the similarity that compare where a keypoint is expected with where one is.
+    place: int = 16
 
     def as_dict(self) -> dict:
         """For checkpoints and the manifest."""
@@ -36,32 +43,21 @@ class MatcherConfig:
 
 
 class FeedForward(nn.Module):
-    """x + MLP(x, message); begins as x."""
+    """x + MLP(x, message)."""
 
-    def __init__(self, dimension: int):
+    def __init__(self, dimension: int, message: int):
         super().__init__()
         self.mlp = nn.Sequential(
-            nn.Linear(2 * dimension, 2 * dimension),
+            nn.Linear(dimension + message, 2 * dimension),
             nn.LayerNorm(2 * dimension),
             nn.ReLU(),
             nn.Linear(2 * dimension, dimension),
         )
-        nn.init.zeros_(self.mlp[-1].weight)
-        nn.init.zeros_(self.mlp[-1].bias)
+        with torch.no_grad():
+            self.mlp[-1].weight *= 0.3
 
-    def forward(self, x: torch.Tensor, message: torch.Tensor) -> torch.Tensor:
-        return x + self.mlp(torch.cat([x, message], -1))
-
-
-class Temperature(nn.Module):
-    """A learned positive factor, at most TEMPERATURE_MAX."""
-
-    def __init__(self, initial: float):
-        super().__init__()
-        self.logarithm = nn.Parameter(torch.tensor(initial).log())
-
-    def forward(self) -> torch.Tensor:
-        return self.logarithm.exp().clamp(max=TEMPERATURE_MAX)
+    def forward(self, x: torch.Tensor, *message: torch.Tensor) -> torch.Tensor:
+        return x + self.mlp(torch.cat([x, *message], -1))
 
 
 class SelfAttention(nn.Module):
@@ -70,57 +66,100 @@ class SelfAttention(nn.Module):
     def __init__(self, config: MatcherConfig):
         super().__init__()
         self.heads, self.anchors = config.heads, config.anchors
+        self.scale = (config.dimension // config.heads) ** -0.5
         self.query = nn.Linear(config.dimension, config.dimension)
         self.key_value = nn.Linear(config.dimension, 2 * config.dimension)
-        self.temperature = Temperature(8.0)
-        self.update = FeedForward(config.dimension)
+        self.update = FeedForward(config.dimension, config.dimension)
 
     def forward(self, x: torch.Tensor, rotation: tuple[torch.Tensor, torch.Tensor]) -> torch.Tensor:
-        anchors = x[:, : self.anchors]
-        key, value = self.key_value(anchors).chunk(2, -1)
+        key, value = self.key_value(x[:, : self.anchors]).chunk(2, -1)
         near = tuple(part[:, :, : self.anchors] for part in rotation)
-        query = self.temperature() * rotated(unit(self._split(self.query(x))), rotation)
-        key = rotated(unit(self._split(key)), near)
-        attention = torch.softmax(query @ key.transpose(-1, -2), -1)
-        message = (attention @ self._split(value)).transpose(1, 2).flatten(2)
-        return self.update(x, message)
+        query = rotated(self._split(self.query(x)) * self.scale, rotation)
+        attention = torch.softmax(query @ rotated(self._split(key), near).transpose(-1, -2), -1)
+        return self.update(x, (attention @ self._split(value)).transpose(1, 2).flatten(2))
 
     def _split(self, x: torch.Tensor) -> torch.Tensor:
         """n x k x (heads * d) to n x heads x k x d."""
         return x.unflatten(-1, (self.heads, -1)).transpose(1, 2)
 
 
-class CrossAttention(nn.Module):
-    """Both images ask each other; one similarity and one exponential serve both directions."""
+class Assignment(NamedTuple):
+    """The similarity n x ka x kb in its factors, its exponential, and the logits that a keypoint has a partner at all.
+
+    The probability of a match is the product of two softmaxes, over rows and over columns, and of both matchabilities.
+    """
+
+    x: torch.Tensor
+    y: torch.Tensor
+    weights: torch.Tensor
+    logit_x: torch.Tensor
+    logit_y: torch.Tensor
+
+    def log_sums(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Logarithms of the softmaxes' denominators: n x ka over rows, n x kb over columns."""
+        return torch.log(self.weights.sum(2)), torch.log(self.weights.sum(1))
+
+
+class Assign(nn.Module):
+    """Compares all keypoints of two images."""
 
     def __init__(self, config: MatcherConfig):
         super().__init__()
-        self.query_key = nn.Linear(config.dimension, config.dimension, bias=False)
-        self.value = nn.Linear(config.dimension, config.dimension)
-        self.temperature = Temperature(15.0)
-        self.update = FeedForward(config.dimension)
-        nn.init.eye_(self.query_key.weight)
+        self.place = config.place
+        self.project = nn.Linear(config.dimension, config.dimension, bias=False)
+        self.expected_actual = nn.Linear(config.dimension, 2 * config.place)
+        self.matchable = nn.Linear(config.dimension, 1)
+        # Ten times its logarithm's rate: the temperature has far to go.
+        self.logarithm = nn.Parameter(torch.tensor(20.0).log() / 10)
+        nn.init.orthogonal_(self.project.weight)
+        with torch.no_grad():
+            self.expected_actual.weight *= 0.3
 
-    def forward(self, x: torch.Tensor, y: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        kx, ky = unit(self.query_key(x)), unit(self.query_key(y))
-        weights = torch.exp((self.temperature() * kx @ ky.transpose(-1, -2)).float())
-        vx, vy = with_ones(self.value(x)), with_ones(self.value(y))
-        return self.update(x, averaged(weights @ vy)), self.update(y, averaged(weights.transpose(-1, -2) @ vx))
+    def forward(self, x: torch.Tensor, y: torch.Tensor) -> Assignment:
+        temperature = (10 * self.logarithm).exp().clamp(max=TEMPERATURE_MAX)
+        factor_x = temperature * self._factor(x, swapped=False)
+        factor_y = self._factor(y, swapped=True)
+        weights = torch.exp((factor_x @ factor_y.transpose(-1, -2)).float())
+        return Assignment(factor_x, factor_y, weights, self.matchable(x)[..., 0].float(), self.matchable(y)[..., 0].float())
+
+    def _factor(self, x: torch.Tensor, swapped: bool) -> torch.Tensor:
+        expected, actual = self.expected_actual(x).chunk(2, -1)
+        place = (actual, expected) if swapped else (expected, actual)
+        return unit(torch.cat([self.project(x), *place], -1).float())
+
+
+class CrossAttention(nn.Module):
+    """Both images ask each other with the weights of an assignment."""
+
+    def __init__(self, config: MatcherConfig):
+        super().__init__()
+        self.value = nn.Linear(config.dimension, config.dimension)
+        self.update = FeedForward(config.dimension, config.dimension + PLAIN)
+
+    def forward(self, x, y, points_x, points_y, assignment: Assignment) -> tuple[torch.Tensor, torch.Tensor]:
+        weights = assignment.weights
+        back = weights.transpose(1, 2)
+        summed_x = weights @ self._values(y, points_y, weights)
+        summed_y = back @ self._values(x, points_x, weights)
+        squares = weights * weights
+        sure_x = squares @ (1 / summed_y[..., -1:])
+        sure_y = squares.transpose(1, 2) @ (1 / summed_x[..., -1:])
+        return self._updated(x, points_x, summed_x, sure_x), self._updated(y, points_y, summed_y, sure_y)
+
+    def _values(self, x: torch.Tensor, points: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
+        """Values, positions, and a column of ones, so that one product gives the weighted sums and the sum of weights."""
+        return torch.cat([self.value(x).to(weights.dtype), points, torch.ones_like(points[..., :1])], -1)
+
+    def _updated(self, x: torch.Tensor, points: torch.Tensor, summed: torch.Tensor, sure: torch.Tensor) -> torch.Tensor:
+        mean = summed[..., :-1] / summed[..., -1:]
+        message, partner = mean[..., :-2], mean[..., -2:]
+        sure, alone = sure / summed[..., -1:], 0.1 * torch.log(summed[..., -1:])
+        return self.update(x, message, points, partner, partner - points, sure, alone)
 
 
 def unit(x: torch.Tensor) -> torch.Tensor:
     """Unit length along the last axis."""
     return x * torch.rsqrt((x * x).sum(-1, keepdim=True) + 1e-8)
-
-
-def with_ones(values: torch.Tensor) -> torch.Tensor:
-    """A column of ones, so that one product gives both the weighted sum and the sum of weights."""
-    return torch.cat([values, torch.ones_like(values[..., :1])], -1)
-
-
-def averaged(summed: torch.Tensor) -> torch.Tensor:
-    """Weighted sums divided by their sums of weights, which stand in the last column."""
-    return summed[..., :-1] / summed[..., -1:]
 
 
 def rotated(x: torch.Tensor, rotation: tuple[torch.Tensor, torch.Tensor]) -> torch.Tensor:
@@ -131,123 +170,85 @@ def rotated(x: torch.Tensor, rotation: tuple[torch.Tensor, torch.Tensor]) -> tor
 
 
 class Matcher(nn.Module):
-    """Keypoints of two images to log scores of every pair and of staying unmatched."""
+    """Keypoints of two images to an assignment after every layer."""
 
     def __init__(self, config: MatcherConfig = MatcherConfig()):
         super().__init__()
         self.config = config
-        dimension = config.dimension
-        self.position = nn.Sequential(nn.Linear(3, 32), nn.ReLU(), nn.Linear(32, dimension))
-        nn.init.zeros_(self.position[-1].weight)
-        nn.init.zeros_(self.position[-1].bias)
-        self.frequencies = nn.Parameter(torch.randn(2, dimension // 2) * 3.0)
+        self.widen = nn.Identity() if config.dimension == config.descriptor else nn.Linear(config.descriptor, config.dimension)
+        self.position = nn.Sequential(nn.Linear(3, 32), nn.ReLU(), nn.Linear(32, config.dimension))
+        # From the whole picture to a tenth of it: every head looks far and near.
+        reach = torch.logspace(0, 1.2, config.dimension // (2 * config.heads)).repeat(config.heads)
+        self.frequencies = nn.Parameter(torch.randn(2, config.dimension // 2) * reach)
         self.self_layers = nn.ModuleList(SelfAttention(config) for _ in range(config.layers))
-        self.cross_layers = nn.ModuleList(CrossAttention(config) for _ in range(config.layers))
-        self.project = nn.Linear(dimension, dimension, bias=False)
-        nn.init.eye_(self.project.weight)
-        self.temperature = Temperature(20.0)
-        self.dustbin = nn.Linear(dimension, 1)
-        nn.init.zeros_(self.dustbin.weight)
-        nn.init.constant_(self.dustbin.bias, 10.0)
+        self.assign_layers = nn.ModuleList(Assign(config) for _ in range(config.layers))
+        self.cross_layers = nn.ModuleList(CrossAttention(config) for _ in range(config.layers - 1))
 
-    def forward(self, points_a, descriptors_a, scores_a, points_b, descriptors_b, scores_b):
+    def forward(self, points_a, descriptors_a, scores_a, points_b, descriptors_b, scores_b, layers: int | None = None):
         """Positions n x k x 2 (normalised), descriptors n x k x 64, keypoint scores n x k, of either image.
 
-        Returns scores n x ka x kb, dustbin scores n x ka and n x kb.
+        Returns the assignments after each of the first `layers` layers (all of them if not given).
         """
-        x, y, bin_a, bin_b = self.embed(points_a, descriptors_a, scores_a, points_b, descriptors_b, scores_b)
-        return (x @ y.transpose(-1, -2)).float(), bin_a, bin_b
-
-    def embed(self, points_a, descriptors_a, scores_a, points_b, descriptors_b, scores_b):
-        """The same, with the scores as factors: n x ka x 64 and n x kb x 64, whose products they are."""
         x = self._embedded(points_a, descriptors_a, scores_a)
         y = self._embedded(points_b, descriptors_b, scores_b)
         rotation_x, rotation_y = self._rotation(points_a), self._rotation(points_b)
-        for own, other in zip(self.self_layers, self.cross_layers):
-            x, y = own(x, rotation_x), own(y, rotation_y)
-            x, y = other(x, y)
-        bins = self.dustbin(x)[..., 0].float(), self.dustbin(y)[..., 0].float()
-        return self.temperature() * unit(self.project(x)), unit(self.project(y)), *bins
+        assignments = []
+        for layer in range(layers or self.config.layers):
+            if layer:
+                x, y = self.cross_layers[layer - 1](x, y, points_a, points_b, assignments[-1])
+            x, y = self.self_layers[layer](x, rotation_x), self.self_layers[layer](y, rotation_y)
+            assignments.append(self.assign_layers[layer](x, y))
+        return assignments
 
     def _embedded(self, points: torch.Tensor, descriptors: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
-        return descriptors + self.position(torch.cat([points, scores[..., None]], -1))
+        # Components of about one, as the layers expect.
+        descriptors = self.widen(descriptors * self.config.descriptor**0.5)
+        return descriptors + self.position(torch.cat([points, torch.log(scores + 1e-3)[..., None] / 3], -1))
 
     def _rotation(self, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         angles = (points @ self.frequencies).unflatten(-1, (self.config.heads, -1)).transpose(1, 2)
         return angles.cos(), angles.sin()
 
 
-def log_assignment(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int) -> torch.Tensor:
-    """Sinkhorn in log space: n x ka x kb scores and dustbins to n x (ka + 1) x (kb + 1) log assignment.
+def log_matchable(logits: torch.Tensor) -> torch.Tensor:
+    """Logarithm of the probability that a keypoint has a partner."""
+    return nn.functional.logsigmoid(logits)
 
-    Every keypoint has mass 1, either dustbin as much as the other image has keypoints (SuperGlue eq. 9, 10). This is the
-    definition; `transport` computes the same many times faster.
+
+def log_probability(assignment: Assignment) -> torch.Tensor:
+    """Log probability of every pair, n x ka x kb (LightGlue eq. 8). The definition; `mutual_matches` never forms it."""
+    rows, columns = assignment.log_sums()
+    own = log_matchable(assignment.logit_x) - rows
+    other = log_matchable(assignment.logit_y) - columns
+    return 2 * torch.log(assignment.weights) + own[:, :, None] + other[:, None]
+
+
+def mutual_matches(assignment: Assignment) -> tuple[torch.Tensor, torch.Tensor]:
+    """Each keypoint's partner (n x ka, -1 without) if each is the other's best, and the probability of the match.
+
+    The best of a column is sought along rows of the transposed product: runtimes search the last axis many times faster.
     """
-    ka, kb = similarity.shape[1:]
-    corner = 0.5 * (bin_a.mean(1) + bin_b.mean(1))
-    top = torch.cat([similarity, bin_a[..., None]], 2)
-    scores = torch.cat([top, torch.cat([bin_b, corner[:, None]], 1)[:, None]], 1)
-    log_mass_a, log_mass_b = scores.new_zeros(ka + 1), scores.new_zeros(kb + 1)
-    log_mass_a[-1], log_mass_b[-1] = torch.log(torch.tensor(float(kb))), torch.log(torch.tensor(float(ka)))
-    v = torch.zeros_like(scores[:, 0])
-    for _ in range(iterations):
-        u = log_mass_a - torch.logsumexp(scores + v[:, None], 2)
-        v = log_mass_b - torch.logsumexp(scores + u[:, :, None], 1)
-    return scores + u[:, :, None] + v[:, None]
-
-
-class Transport(NamedTuple):
-    """A plan u * kernel * v in its factors (n x ka x 1, n x ka x kb, n x 1 x kb), and the masses left in either dustbin."""
-
-    u: torch.Tensor
-    kernel: torch.Tensor
-    v: torch.Tensor
-    alone_a: torch.Tensor
-    alone_b: torch.Tensor
-
-
-def transport(similarity: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int) -> Transport:
-    """The plan of `log_assignment` by products with vectors instead of logarithms of sums.
-
-    Scores are bounded by TEMPERATURE_MAX, so their exponentials need no other protection than this common offset.
-    """
-    ka, kb = bin_a.shape[1], bin_b.shape[1]
-    corner = torch.exp(0.5 * (bin_a.mean(1, keepdim=True) + bin_b.mean(1, keepdim=True)) - TEMPERATURE_MAX)[..., None]
-    kernel = torch.exp(similarity - TEMPERATURE_MAX)
-    to_bin, from_bin = torch.exp(bin_a - TEMPERATURE_MAX)[:, :, None], torch.exp(bin_b - TEMPERATURE_MAX)[:, None]
-    v, v_bin = torch.ones_like(from_bin), torch.ones_like(corner)
-    for _ in range(iterations):
-        u = 1 / (kernel @ v.transpose(1, 2) + to_bin * v_bin)
-        u_bin = kb / ((from_bin * v).sum(2, keepdim=True) + corner * v_bin)
-        v = 1 / (u.transpose(1, 2) @ kernel + from_bin * u_bin)
-        v_bin = ka / ((to_bin * u).sum(1, keepdim=True) + corner * u_bin)
-    return Transport(u, kernel, v, (u * to_bin * v_bin)[..., 0], (u_bin * from_bin * v)[:, 0])
-
-
-def mutual_matches(x: torch.Tensor, y: torch.Tensor, bin_a: torch.Tensor, bin_b: torch.Tensor, iterations: int):
-    """Each keypoint's partner (n x ka, -1 without) if each is the other's best, and the mass between them.
-
-    `x`, `y` are the factors of the scores. The best of a column is sought along rows of the transposed product: runtimes
-    search the last axis many times faster than the one before.
-    """
-    u, kernel, v, _, _ = transport(x @ y.transpose(1, 2), bin_a, bin_b, iterations)
-    best, partner = (kernel * v).max(2)
-    partner_back = (y @ x.transpose(1, 2) + torch.log(u).transpose(1, 2)).argmax(2)
+    x, y = assignment.x, assignment.y
+    rows, columns = assignment.log_sums()
+    own = log_matchable(assignment.logit_x) - rows
+    other = log_matchable(assignment.logit_y) - columns
+    best, partner = (2 * (x @ y.transpose(1, 2)) + other[:, None]).max(2)
+    partner_back = (2 * (y @ x.transpose(1, 2)) + own[:, None]).argmax(2)
     mutual = partner_back.gather(1, partner) == torch.arange(x.shape[1], device=x.device)
-    return torch.where(mutual, partner, -1), torch.where(mutual, best * u[..., 0], torch.zeros_like(best))
+    return torch.where(mutual, partner, -1), torch.where(mutual, torch.exp(best + own), torch.zeros_like(best))
 
 
 class ExportedMatcher(nn.Module):
     """What is exported: two images' keypoints, without a batch axis, to matches (k of image a, -1 without) and confidences."""
 
-    def __init__(self, matcher: Matcher):
+    def __init__(self, matcher: Matcher, layers: int):
         super().__init__()
-        self.matcher = matcher
+        self.matcher, self.layers = matcher, layers
 
     def forward(self, keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1):
         inputs = (keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1)
-        factors = self.matcher.embed(*(x[None] for x in inputs))
-        matches, confidences = mutual_matches(*factors, self.matcher.config.sinkhorn_iterations)
+        assignments = self.matcher(*(x[None] for x in inputs), layers=self.layers)
+        matches, confidences = mutual_matches(assignments[-1])
         return matches[0], confidences[0]
 
 

@@ -8,14 +8,17 @@ import numpy as np
 import torch
 
 from . import augment
-from .extractor import Extractor, heat_map
+from .extractor import Extractor
+from .features import write as write_features
 from .geometry import View, Warp, transform_points
-from .matcher import ExportedMatcher, Matcher, log_assignment, transport
+from .matcher import Matcher, log_probability, mutual_matches
 from .matcher_loss import UNMATCHED, match_labels
 from .synthetic import write_set
+from .train_extractor import add_extractor_options
 from .train_extractor import plan_from as extractor_plan
+from .train_matcher import add_matcher_options
 from .train_matcher import plan_from as matcher_plan
-from .trainer import Run, add_options, loader
+from .trainer import Run
 
 
 def main() -> None:
@@ -28,9 +31,9 @@ def main() -> None:
             check_warp_on_a_plane,
             check_warp_sees_occlusion,
             check_homography_round_trip,
-            check_sinkhorn,
-            check_untrained_matcher_is_nearest_neighbour,
-            check_untrained_heat_map_prefers_corners,
+            check_matches_are_the_best_of_the_assignment,
+            check_fast_matcher_is_the_first_layers,
+            check_heat_map_finds_blobs,
             check_labels_are_mutual,
         ):
             check()
@@ -86,38 +89,41 @@ def check_homography_round_trip() -> None:
     assert visible.any() and np.abs(landed - transform_points(maps[1], native)).max() < 1e-6
 
 
-def check_sinkhorn() -> None:
-    """Columns of the plan sum to their masses exactly, rows nearly; the fast form equals the one in log space."""
-    similarity, bin_a, bin_b = torch.randn(2, 30, 41) * 3, torch.randn(2, 30), torch.randn(2, 41)
-    plan = log_assignment(similarity, bin_a, bin_b, iterations=100).exp()
-    assert torch.allclose(plan[:, :, :-1].sum(1), torch.ones(2, 41), atol=1e-4)
-    assert torch.allclose(plan[:, :-1].sum(2), torch.ones(2, 30), atol=1e-2)
-    few = log_assignment(similarity, bin_a, bin_b, iterations=5).exp()
-    fast = transport(similarity, bin_a, bin_b, 5)
-    assert torch.allclose(fast.u * fast.kernel * fast.v, few[:, :-1, :-1], atol=1e-4)
-    assert torch.allclose(fast.alone_a, few[:, :-1, -1], atol=1e-4)
-    assert torch.allclose(fast.alone_b, few[:, -1, :-1], atol=1e-4)
+def _random_keypoints(n: int, count: int) -> tuple[torch.Tensor, ...]:
+    descriptors = torch.nn.functional.normalize(torch.randn(n, count, 64), dim=2)
+    return torch.rand(n, count, 2) * 2 - 1, descriptors, torch.rand(n, count)
 
 
-def check_untrained_matcher_is_nearest_neighbour() -> None:
-    """Before training, a permuted set of descriptors is matched to itself."""
-    descriptors = torch.nn.functional.normalize(torch.randn(50, 64), dim=1)
-    order, points, scores = torch.randperm(50), torch.rand(50, 2), torch.rand(50)
+def check_matches_are_the_best_of_the_assignment() -> None:
+    """The matches, found without forming the probabilities, are the mutual maxima of the probabilities."""
     with torch.no_grad():
-        matches, confidences = ExportedMatcher(Matcher())(
-            points, descriptors, scores, points[order], descriptors[order], scores[order]
-        )
-    assert (order[matches] == torch.arange(50)).all() and float(confidences.min()) > 0.5
+        assignment = Matcher()(*_random_keypoints(2, 30), *_random_keypoints(2, 41))[-1]
+    matches, confidences = mutual_matches(assignment)
+    probability = log_probability(assignment).exp()
+    best, partner = probability.max(2)
+    mutual = probability.argmax(1).gather(1, partner) == torch.arange(30)
+    assert torch.equal(matches, torch.where(mutual, partner, -1)) and mutual.any()
+    assert torch.allclose(confidences, best * mutual, rtol=1e-3, atol=1e-6) and float(probability.sum(2).max()) <= 1 + 1e-4
 
 
-def check_untrained_heat_map_prefers_corners() -> None:
-    """Before training, a bright square's corners are hotter than its edges and inside."""
-    image = torch.full((1, 1, 64, 96), 40.0)
-    image[:, :, 20:44, 30:66] = 200.0
+def check_fast_matcher_is_the_first_layers() -> None:
+    """Asked for fewer layers, the matcher gives what it gave after them."""
+    matcher, keypoints = Matcher(), _random_keypoints(1, 20) + _random_keypoints(1, 25)
     with torch.no_grad():
-        heat = heat_map(Extractor().eval()(image)[0])[0, 0]
-    corner = float(heat[18:23, 28:33].max())
-    assert corner > 3 * float(heat[18:23, 44:52].max()) and corner > 3 * float(heat[28:36, 44:52].max())
+        fast, whole = matcher(*keypoints, layers=2), matcher(*keypoints)
+    assert len(fast) == 2 and torch.equal(fast[1].weights, whole[1].weights)
+
+
+def check_heat_map_finds_blobs() -> None:
+    """Spots are the strongest maxima, at their places; an edge is none."""
+    y, x = np.mgrid[:64, :96]
+    image = np.where(x > 70, 160.0, 80.0)
+    for cx, cy in ((20.0, 20.0), (40.0, 44.0)):
+        image += 60 * np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / 8)
+    with torch.no_grad():
+        heat = Extractor().eval()(torch.from_numpy(image)[None, None].float())[0][0, 0]
+    strongest = {tuple(divmod(int(i), 96)) for i in heat.flatten().topk(2).indices}
+    assert strongest == {(20, 20), (44, 40)} and float(heat[10:54, 66:76].max()) < 0.1 * float(heat.max())
 
 
 def check_labels_are_mutual() -> None:
@@ -142,24 +148,31 @@ def check_resume_gives_the_same_next_step(folder: Path) -> None:
         assert torch.equal(one, other)
     whole.folder.mkdir(exist_ok=True)
     whole._save(whole._checkpoint_path())
-    options = _options(folder, "matcher")
-    options.extractor, options.layers = whole._checkpoint_path(), 2
-    options.keypoints, options.rounds = (64, 96), 2
+    _check_matcher_trains(folder, whole._checkpoint_path())
+
+
+def _check_matcher_trains(folder: Path, extractor: Path) -> None:
+    """Keypoints are found, and the matcher makes two steps on them."""
+    arguments = argparse.Namespace(
+        extractor=extractor, data=folder / "rooms", out=folder / "features", versions=2, seed=0, part="0/1"
+    )
+    write_features(arguments)
+    options = _options(folder, "matcher", "--features", str(folder / "features"), "--keypoints", "64")
     assert np.isfinite(_advanced(matcher_plan(options), 2).last["loss"])
 
 
-def _options(folder: Path, run: str) -> argparse.Namespace:
+def _options(folder: Path, run: str, *more: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
-    add_options(parser, steps=4, batch=2)
+    (add_matcher_options if more else add_extractor_options)(parser)
     return parser.parse_args(
         ["--data", str(folder / "rooms"), "--run", str(folder / run), "--device", "cpu", "--precision", "fp32"]
-        + ["--threads", "1", "--workers", "0"]
+        + ["--threads", "1", "--steps", "4", "--batch", "2", *(more or ("--workers", "0"))]
     )
 
 
 def _advanced(plan, steps: int) -> Run:
     run = Run(plan)
-    batches = iter(loader(plan.dataset, run.step, plan.options.steps, plan.options.batch, 0))
+    batches = plan.batches(run.step)
     for _ in range(steps):
         run.last = run.advance(next(batches))
     return run

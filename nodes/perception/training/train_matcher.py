@@ -1,66 +1,65 @@
-"""Trains the matcher on a frozen extractor: `python -m training.train_matcher --extractor CHECKPOINT --data PAIRS --run RUN`."""
+"""Trains the matcher on the keypoints of a frozen extractor, which `training.features` found.
+
+`python -m training.train_matcher --data PAIRS --features KEYPOINTS --run RUN`, as many --features as --data, in that order.
+"""
 
 import argparse
 from pathlib import Path
 
-import numpy as np
 import torch
 
-from .extractor import Extractor
+from .feature_pairs import FeaturePairs, FeatureSet
+from .features import Features
 from .matcher import Matcher, MatcherConfig
-from .matcher_loss import extract, matcher_loss
-from .trainer import Plan, add_options, dataset_from, device_from, train
+from .matcher_loss import matcher_loss
+from .trainer import Plan, add_options, pair_sets, train
 
 
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    add_options(parser, steps=4000, batch=8)
-    parser.add_argument("--extractor", type=Path, required=True, help="checkpoint or snapshot of the trained extractor")
-    parser.add_argument("--layers", type=int, default=MatcherConfig.layers)
-    parser.add_argument("--keypoints", type=int, nargs=2, default=(192, 384), help="least and most keypoints an image")
-    parser.add_argument("--rounds", type=int, default=2, help="times that a batch's features are used")
+    add_matcher_options(parser)
     train(plan_from(parser.parse_args()))
+
+
+def add_matcher_options(parser: argparse.ArgumentParser) -> None:
+    """All options."""
+    add_options(parser, steps=8000, batch=8)
+    parser.add_argument("--features", type=Path, action="append", required=True, help="keypoints of the pair set of --data")
+    parser.add_argument("--layers", type=int, default=MatcherConfig.layers)
+    parser.add_argument("--keypoints", type=int, nargs="+", default=(192, 256, 384), help="keypoints an image, one is drawn")
+    parser.add_argument("--same-view", type=float, default=0.05, help="share of pairs that are two versions of one view")
 
 
 def plan_from(options: argparse.Namespace) -> Plan:
     """The plan that the options describe."""
     torch.manual_seed(options.seed)
-    dataset, described = dataset_from(options, "matcher")
-    extractor, extractor_facts = load_extractor(options.extractor, device_from(options.device))
+    sets, described = pair_sets(options)
+    if len(options.features) != len(sets):
+        raise ValueError(f"{len(sets)} --data but {len(options.features)} --features: name one for each")
+    read = [FeatureSet(s, Features(folder, s), share) for (s, share), folder in zip(sets, options.features)]
+    pairs = FeaturePairs(read, options.seed, options.batch, list(options.keypoints), options.same_view)
     matcher = Matcher(MatcherConfig(layers=options.layers))
     facts = {
         "data": described,
-        "homographies": options.homographies,
+        "versions": [s.features.versions for s in read],
+        "same_view": options.same_view,
+        "keypoints": list(options.keypoints),
         "batch": options.batch,
         "rate": options.rate,
-        "rounds": options.rounds,
         "config": matcher.config.as_dict(),
-        "extractor_step": extractor_facts["step"],
+        "extractor_checkpoint_sha256": read[0].features.about["extractor_sha256"],
     }
 
-    def step_losses(model, batch, step, autocast):
-        rng = np.random.default_rng([options.seed, step, 1])
-        low, high = options.keypoints
+    def loss(model: Matcher, batch, autocast):
         with autocast():
-            features = extract(extractor, torch.cat([batch.images_a, batch.images_b]), high)
-        # Features cost more than the matcher does: each batch serves several updates, by halves, with other keypoint counts.
-        half = max(1, options.batch // 2)
-        for _ in range(options.rounds):
-            for begin in range(0, options.batch, half):
-                pairs = slice(begin, min(begin + half, options.batch))
-                yield matcher_loss(model, features, batch, pairs, int(rng.integers(low, high + 1)), autocast)
+            assignments = model(*batch.a, *batch.b)
+        return matcher_loss(assignments, batch.labels_a, batch.labels_b, model.config.fast_layers)
 
-    return Plan("matcher", matcher, step_losses, dataset, options.rate, options, facts)
+    def batches(first: int):
+        return pairs.batches(first, options.steps)
 
-
-def load_extractor(path: Path, device: torch.device) -> tuple[Extractor, dict]:
-    """A trained extractor, frozen, and the checkpoint's facts."""
-    state = torch.load(path, map_location=device, weights_only=True)
-    extractor = Extractor()
-    extractor.load_state_dict(state["model"])
-    extractor = extractor.to(device).eval().requires_grad_(False).to(memory_format=torch.channels_last)
-    return extractor, {name: value for name, value in state.items() if name not in ("model", "optimizer")}
+    return Plan("matcher", matcher, loss, batches, options.rate, options, facts)
 
 
 def load_matcher(path: Path, device: torch.device) -> tuple[Matcher, dict]:

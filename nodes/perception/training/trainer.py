@@ -2,23 +2,23 @@
 
 import argparse
 import csv
+import math
 import os
 import time
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Callable
 
 import cv2
 import torch
 from tqdm import tqdm
 
-from .data import PairDataset, PairSet, loader
+from .data import PairSet
 
 CLIP_NORM = 2.0
 WARM_UP_STEPS = 60
-# The rate is constant, then falls to its last share over the last part: `--steps` may be raised before the fall begins.
-FALL_BEGINS, LAST_RATE = 0.65, 0.03
+LAST_RATE = 0.02
 LOG_EVERY_STEPS = 25
 
 
@@ -28,9 +28,10 @@ class Plan:
 
     name: str
     model: torch.nn.Module
-    # (model, batch, step, autocast) to one or more losses with their parts; each is followed by an update of the model.
-    step_losses: Callable
-    dataset: PairDataset
+    # (model, batch, autocast) to the loss and its parts for the log.
+    loss: Callable
+    # The batches of all steps from a first one on.
+    batches: Callable[[int], Iterator]
     rate: float
     options: argparse.Namespace
     # Goes into every checkpoint: what is needed to rebuild the model and to say how it was made.
@@ -45,25 +46,25 @@ def add_options(parser: argparse.ArgumentParser, steps: int, batch: int) -> None
     parser.add_argument("--batch", type=int, default=batch, help="pairs a step")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rate", type=float, default=2e-3, help="learning rate")
-    parser.add_argument("--homographies", type=float, default=0.25, help="share of pairs that are one view warped")
     parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
     parser.add_argument("--precision", default="auto", choices=("auto", "bf16", "fp32"))
     parser.add_argument("--threads", type=int, default=0, help="CPU threads of the network (0: all)")
-    parser.add_argument("--workers", type=int, default=1, help="processes that prepare pairs")
     parser.add_argument("--checkpoint-minutes", type=float, default=3)
     parser.add_argument("--snapshot-minutes", type=float, default=5, help="weights kept for the learning curve")
     parser.add_argument("--resume", action=argparse.BooleanOptionalAction, default=True, help="go on where --run stopped")
 
 
-def dataset_from(options: argparse.Namespace, task: str) -> tuple[PairDataset, dict]:
-    """The training data named by --data, and a description of it."""
-    sets = []
-    for text in options.data:
-        folder, _, share = text.partition(":")
-        sets.append((PairSet([Path(folder)]), float(share or 1)))
-    length = options.steps * options.batch
-    described = {Path(t.partition(":")[0]).name: s.describe() | {"share": w} for t, (s, w) in zip(options.data, sets)}
-    return PairDataset(sets, options.seed, length, options.homographies, task), described
+def pair_sets(options: argparse.Namespace) -> tuple[list[tuple[PairSet, float]], dict]:
+    """The pair sets named by --data with their shares, and a description of them."""
+    sets = [(PairSet([Path(folder)]), share) for folder, share in folders(options.data)]
+    described = {folder.name: s.describe() | {"share": share} for (folder, share), (s, _) in zip(folders(options.data), sets)}
+    return sets, described
+
+
+def folders(texts: list[str]) -> list[tuple[Path, float]]:
+    """Folders and shares from FOLDER or FOLDER:SHARE."""
+    parts = [text.partition(":") for text in texts]
+    return [(Path(folder), float(share or 1)) for folder, _, share in parts]
 
 
 def device_from(name: str) -> torch.device:
@@ -84,13 +85,11 @@ def autocast_from(device: torch.device, precision: str) -> Callable:
 
 
 def rate_at(step: int, steps: int, rate: float) -> float:
-    """Learning rate: warm-up, plateau, linear fall."""
+    """Learning rate: warm-up, then half a cosine down to its last share."""
     if step < WARM_UP_STEPS:
         return rate * (step + 1) / WARM_UP_STEPS
-    begin = FALL_BEGINS * steps
-    if step < begin:
-        return rate
-    return rate * (1 - (1 - LAST_RATE) * (step - begin) / max(1.0, steps - begin))
+    done = (step - WARM_UP_STEPS) / max(1, steps - WARM_UP_STEPS)
+    return rate * (LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * min(1.0, done))))
 
 
 def train(plan: Plan) -> None:
@@ -122,7 +121,7 @@ class Run:
         options, saved, shot = self.options, time.monotonic(), time.monotonic()
         sums, clock = {}, time.monotonic()
         bar = tqdm(total=options.steps, initial=self.step, unit="step", desc=self.plan.name, smoothing=0.05, mininterval=5)
-        for batch in loader(self.plan.dataset, self.step, options.steps, options.batch, options.workers):
+        for batch in self.plan.batches(self.step):
             parts = self.advance(batch)
             for name, value in parts.items():
                 sums.setdefault(name, []).append(value)
@@ -145,17 +144,14 @@ class Run:
         bar.close()
 
     def advance(self, batch) -> dict[str, float]:
-        """One step: the batch's losses, each with an update. A loss that is not finite is dropped and counted in the log."""
-        batch.images_a, batch.images_b = batch.images_a.to(self.device), batch.images_b.to(self.device)
+        """One step. A loss that is not finite is dropped and counted in the log."""
         for group in self.optimizer.param_groups:
             group["lr"] = rate_at(self.step, self.options.steps, self.plan.rate)
         self.model.train()
-        rows = []
-        for loss, parts in self.plan.step_losses(self.model, batch, self.step, self.autocast):
-            sound = self._update(loss)
-            rows.append({"loss": float(loss.detach())} | parts | {"dropped": float(not sound)})
+        loss, parts = self.plan.loss(self.model, batch.to(self.device), self.autocast)
+        sound = self._update(loss)
         self.step += 1
-        return {name: sum(row[name] for row in rows) / len(rows) for name in rows[0]}
+        return {"loss": float(loss.detach())} | parts | {"dropped": float(not sound)}
 
     def _update(self, loss: torch.Tensor) -> bool:
         """One step down the gradient, if it is finite."""

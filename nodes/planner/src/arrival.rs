@@ -1,6 +1,7 @@
-//! The decision to stop: close enough that no step leads closer, turned to the photo's heading, and seen to be so.
+//! The decision to stop: close enough that no step leads closer, turned to the photo's heading, and seen to be so. A turn
+//! of 15 degrees leaves up to 7.5: what is left is turned at the end, once and finely.
 
-use homing_core::{PlanarPose, Stamp};
+use homing_core::{PlanarPose, Stamp, wrap_angle};
 
 use crate::config::BodyConfig;
 use crate::hypothesis::Hypothesis;
@@ -18,13 +19,25 @@ pub struct ArrivalConfig {
     pub regain_m: f64,
     /// Times the body may leave its final heading to come closer.
     pub returns_max: u32,
+    /// A heading that is off by less needs no last turn, radians.
+    pub fine_rad: f64,
+    /// Last turns, each finer than a whole one.
+    pub fine_turns_max: u32,
     /// Fresh estimates waited for at the goal before deciding without.
     pub wait_steps_max: u32,
 }
 
 impl Default for ArrivalConfig {
     fn default() -> Self {
-        Self { near_m: 0.6, gain_m: 0.03, regain_m: 0.10, returns_max: 3, wait_steps_max: 8 }
+        Self {
+            near_m: 0.6,
+            gain_m: 0.03,
+            regain_m: 0.10,
+            returns_max: 3,
+            fine_rad: 0.01,
+            fine_turns_max: 2,
+            wait_steps_max: 8,
+        }
     }
 }
 
@@ -37,6 +50,8 @@ pub enum Approach {
     Step(LocalChoice),
     /// Position reached: turn to the heading.
     Align(LocalChoice),
+    /// The heading is nearer than a whole turn: turn by what is left, milliradians, left positive.
+    Face(i32),
     /// Position and heading reached, confirmed from here.
     Arrived,
     /// Position and heading reached, no estimate from here yet.
@@ -50,6 +65,7 @@ pub enum Approach {
 pub struct Arrival {
     aligning: bool,
     n_returns: u32,
+    n_fine_turns: u32,
     in_place_since: Option<Stamp>,
     n_waited: u32,
     confirmed: bool,
@@ -106,6 +122,12 @@ impl Arrival {
         if turn != LocalChoice::Nowhere {
             self.in_place_since = None;
             return Approach::Align(turn);
+        }
+        let left_rad = wrap_angle(goal.yaw_rad - pose.yaw_rad);
+        if left_rad.abs() > config.fine_rad && self.n_fine_turns < config.fine_turns_max {
+            self.n_fine_turns += 1;
+            self.in_place_since = None;
+            return Approach::Face((1e3 * left_rad).round() as i32);
         }
         self.judge(config, stamp)
     }

@@ -161,6 +161,7 @@ impl PlannerConfig {
             ("unknown_cells.cost", unknown_cost, 1.0, 100.0),
             ("switches.distance_max_m", self.switches.distance_max_m, 0.5, 20.0),
             ("arrival.near_m", self.arrival.near_m, 0.1, 2.0),
+            ("arrival.fine_rad", self.arrival.fine_rad, 0.001, 1.0),
             ("step_budget", self.step_budget as f64, 1.0, 1e9),
         ];
         for (name, value, min, max) in ranges {

@@ -7,7 +7,7 @@ use homing_core::{Base, Camera, DepthImage, GoalEstimate, Intrinsics, MotionOutc
 /// A change of mission.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum Mission {
-    /// A goal photo was given: begin a new episode.
+    /// A goal photo was given: begin a new episode. What is known of the surroundings stays known.
     Start {
         /// The photo's name; estimates that speak of another photo are ignored.
         goal_id: u64,
@@ -47,6 +47,8 @@ pub struct StepEvent {
     pub observation: Option<PlannerObservation>,
     /// Perception's newest finding, possibly of an older image.
     pub estimate: Option<GoalEstimate>,
+    /// What it found in images from before: a place that was seen long ago, for a photo that was given now. Oldest first.
+    pub remembered: Vec<GoalEstimate>,
     /// What the last motion came to.
     pub motion: Option<MotionOutcome>,
     /// Whether perception answers.
@@ -57,6 +59,13 @@ impl StepEvent {
     /// An event in which nothing happened.
     #[must_use]
     pub fn nothing() -> Self {
-        Self { mission: None, observation: None, estimate: None, motion: None, perception: Perception::Absent }
+        Self {
+            mission: None,
+            observation: None,
+            estimate: None,
+            remembered: Vec::new(),
+            motion: None,
+            perception: Perception::Absent,
+        }
     }
 }

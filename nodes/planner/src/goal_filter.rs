@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use crate::evidence::Evidence;
 use crate::hypothesis::Hypothesis;
 pub use crate::hypothesis::Measurement;
+use crate::ladder::{Climb, LadderConfig, Standing};
 
 /// Squared Mahalanobis distance that 99.9 % of agreeing (x, y, yaw) stay below.
 const GATE: f64 = 16.3;
@@ -31,14 +32,10 @@ pub struct FilterConfig {
     pub drift_m: f64,
     /// Odometry drift per step, radians (one standard deviation).
     pub drift_rad: f64,
-    /// Views that should have shown the goal and did not, in a row, before its hypothesis is dropped.
-    pub misses_max: u32,
+    /// When a hypothesis is confirmed, kept or dropped while approaching.
+    pub ladder: LadderConfig,
     /// A hypothesis keeps this share of its support when a view that should have shown the goal did not.
     pub miss_factor: f64,
-    /// Within this distance a view that matches the photo's must show it, metres.
-    pub verify_m: f64,
-    /// And within this difference of heading, radians.
-    pub verify_rad: f64,
     /// A place that lied is not believed again within this distance, metres.
     pub liar_m: f64,
     /// Nor within this difference of heading, radians.
@@ -54,10 +51,8 @@ impl Default for FilterConfig {
             heading_sd_min_rad: 0.03,
             drift_m: 0.005,
             drift_rad: 0.002,
-            misses_max: 4,
+            ladder: LadderConfig::default(),
             miss_factor: 0.65,
-            verify_m: 1.0,
-            verify_rad: 0.5,
             liar_m: 0.6,
             liar_rad: 0.6,
         }
@@ -125,6 +120,16 @@ impl GoalFilter {
         self.rigour = 1.0;
     }
 
+    /// The same goal is given again: what spoke for a place still does, what spoke against one may have changed.
+    pub fn begin_again(&mut self) {
+        self.liars.clear();
+        self.rigour = 1.0;
+        for hypothesis in &mut self.hypotheses {
+            (hypothesis.parked_until, hypothesis.last_seen_step) = (0, 0);
+            (hypothesis.n_misses, hypothesis.n_missed) = (0, 0);
+        }
+    }
+
     /// The knobs.
     #[must_use]
     pub fn config(&self) -> &FilterConfig {
@@ -137,6 +142,13 @@ impl GoalFilter {
         for hypothesis in &mut self.hypotheses {
             hypothesis.drift(position, yaw);
         }
+    }
+
+    /// Widens a measurement by the odometry's drift over the steps since its image was taken.
+    pub fn age(&self, measurement: &mut Measurement, n_steps: usize) {
+        let n = n_steps as f64;
+        let variances = Vector3::new(self.config.drift_m, self.config.drift_m, self.config.drift_rad);
+        measurement.covariance += Matrix3::from_diagonal(&variances.map(|sd| n * sd * sd));
     }
 
     /// The planar goal pose an estimate stands for: the base pose at which the robot's camera coincides with the goal camera,
@@ -230,7 +242,7 @@ impl GoalFilter {
         let jacobian = Vector3::new(-dy / square, dx / square, 0.0);
         let agreed = hypothesis.fuse_scalar(&jacobian, innovation, sd * sd);
         if agreed {
-            hypothesis.n_misses = 0;
+            (hypothesis.n_misses, hypothesis.n_missed) = (0, 0);
         }
         agreed
     }
@@ -248,23 +260,34 @@ impl GoalFilter {
     }
 
     /// Perception looked from `pose`, with nothing in between if `clear`, and did not agree with the best hypothesis. From a
-    /// view that is no worse than those that did agree this is held against it; from one that is all but the photo's own,
-    /// `misses_max` times in a row, it refutes it.
-    pub fn doubt(&mut self, pose: &PlanarPose, clear: Sightline, step: u64) -> Doubt {
+    /// view that is no worse than those that did agree, or all but the photo's own, this is held against it. `n_th` is the
+    /// switch's threshold, matches; the [ladder](LadderConfig) judges.
+    pub fn doubt(&mut self, pose: &PlanarPose, clear: Sightline, n_th: f64, step: u64) -> Doubt {
         let config = self.config;
         let Some(best) = self.best_index(step) else { return Doubt::None };
         let hypothesis = &mut self.hypotheses[best];
         let range_m = pose.distance_to(hypothesis.pose.x_m, hypothesis.pose.y_m);
         let turn_rad = wrap_angle(pose.yaw_rad - hypothesis.pose.yaw_rad).abs();
-        let alike = range_m <= config.verify_m && turn_rad <= config.verify_rad;
+        let alike = config.ladder.is_there(range_m, turn_rad);
         let no_worse = range_m <= hypothesis.farthest_m && turn_rad <= hypothesis.widest_rad + 0.1;
         if alike {
             hypothesis.n_misses += 1;
         }
         if alike || (no_worse && clear == Sightline::Clear) {
             hypothesis.support *= config.miss_factor;
+            hypothesis.n_missed += 1;
         }
-        if hypothesis.n_misses >= config.misses_max { Doubt::Refuted } else { Doubt::None }
+        let climb = Climb {
+            range_m,
+            support: hypothesis.support,
+            n_th,
+            n_missed: hypothesis.n_missed,
+            n_missed_there: hypothesis.n_misses,
+        };
+        match config.ladder.standing(&climb) {
+            Standing::Dropped => Doubt::Refuted,
+            Standing::Confirmed | Standing::Kept => Doubt::None,
+        }
     }
 
     /// The best hypothesis was wrong: drop it and do not believe its place again.

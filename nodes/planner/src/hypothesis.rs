@@ -57,8 +57,10 @@ pub struct Hypothesis {
     pub widest_rad: f64,
     /// Where the robot was at the newest agreeing estimate.
     pub seen_from: PlanarPose,
-    /// Views in a row that should have confirmed it and did not.
+    /// Views in a row that were all but the photo's own and did not show it.
     pub n_misses: u32,
+    /// Views in a row that were no worse than those that showed it, and did not.
+    pub n_missed: u32,
     /// Not to be driven to before this step: no way led there.
     pub parked_until: u64,
 }
@@ -79,6 +81,7 @@ impl Hypothesis {
             widest_rad: measurement.turn_rad,
             seen_from: measurement.from,
             n_misses: 0,
+            n_missed: 0,
             parked_until: 0,
         }
     }
@@ -114,7 +117,7 @@ impl Hypothesis {
         self.nearest_m = self.nearest_m.min(measurement.range_m);
         self.farthest_m = self.farthest_m.max(measurement.range_m);
         self.widest_rad = self.widest_rad.max(measurement.turn_rad);
-        self.n_misses = 0;
+        (self.n_misses, self.n_missed) = (0, 0);
     }
 
     /// Fuses one scalar: `innovation` with variance `variance`, seen through the row `jacobian` over (x, y, yaw).

@@ -3,6 +3,8 @@
 mod drive;
 mod sense;
 
+use core::time::Duration;
+
 use homing_core::{
     Action, BearingHint, GoalDiscovery, GridGeometry, Mode, NavigationState, OccupancyGrid, OdometryBuffer, PlanarPose,
     Stamp,
@@ -20,11 +22,13 @@ use crate::route::RoutePlanner;
 use crate::switches::Verdict;
 use crate::terrain::Terrain;
 
-/// Odometry readings remembered: a minute at 10 Hz.
-const ODOMETRY_KEPT: usize = 600;
+/// Odometry readings remembered, some half an hour at 10 Hz: perception speaks of images as old as its memory.
+const ODOMETRY_KEPT: usize = 20_000;
 const HINTS_MAX: usize = 16;
 /// A faint sighting that came to nothing within this many steps is forgotten.
 const HINT_STEPS: u64 = 60;
+/// A reading this much older than the last means that the robot's clock began anew.
+const CLOCK_RESTART: Duration = Duration::from_millis(500);
 /// Rejected readings in a row after which the clock is taken to have restarted.
 const REJECTED_MAX: u32 = 10;
 
@@ -68,6 +72,8 @@ pub struct Planner {
     arrival: Arrival,
     progress: Progress,
     goal_id: Option<u64>,
+    /// The goal of this mission or the last.
+    last_goal_id: Option<u64>,
     n_rejected: u32,
     restarted: bool,
     /// Last motion asked for: what a motion's outcome speaks of.
@@ -97,6 +103,7 @@ impl Planner {
             arrival: Arrival::default(),
             progress: Progress::default(),
             goal_id: None,
+            last_goal_id: None,
             n_rejected: 0,
             restarted: false,
             commanded: Action::Hold,
@@ -114,12 +121,13 @@ impl Planner {
         self.state.target_m = None;
         self.state.path_m.clear();
         let decision = self.decide(now, event);
-        if matches!(decision.action, Action::Forward | Action::TurnLeft | Action::TurnRight) {
+        if !matches!(decision.action, Action::Stop | Action::Hold) {
             self.commanded = decision.action;
         }
         self.state.action = decision.action;
         self.state.reason = decision.reason;
-        self.state.goal = self.filter.best(self.state.step).map(|h| h.report());
+        let best = self.goal_id.and_then(|_| self.filter.best(self.state.step));
+        self.state.goal = best.map(|h| h.report());
         self.state.frontiers_m = self.discovery.candidates_m();
         decision.action
     }
@@ -160,6 +168,9 @@ impl Planner {
         if self.spend_step() == Budget::Spent {
             return Decision::hold("the step budget is spent");
         }
+        for estimate in &event.remembered {
+            self.recall(observation, estimate);
+        }
         self.fuse(observation, event.estimate.as_ref());
         if core::mem::take(&mut self.restarted) {
             return Decision::hold("the odometry jumped: a new map begins");
@@ -180,16 +191,19 @@ impl Planner {
     fn follow_mission(&mut self, mission: Option<Mission>) {
         match mission {
             Some(Mission::Start { goal_id }) => {
-                self.goal_id = Some(goal_id);
-                self.odometry = OdometryBuffer::new(ODOMETRY_KEPT);
-                self.begin_map();
+                if self.last_goal_id == Some(goal_id) {
+                    self.filter.begin_again();
+                } else {
+                    self.filter.reset();
+                }
+                (self.goal_id, self.last_goal_id) = (Some(goal_id), Some(goal_id));
+                self.begin_search();
                 self.restarted = false;
                 self.commanded = Action::Hold;
                 self.state = NavigationState { mode: Mode::Explore, ..idle_state() };
             }
             Some(Mission::Cancel) => {
                 self.goal_id = None;
-                self.filter.reset();
                 self.state.mode = Mode::Idle;
             }
             None => {}
@@ -200,6 +214,11 @@ impl Planner {
     fn begin_map(&mut self) {
         self.mapper.reset();
         self.filter.reset();
+        self.begin_search();
+    }
+
+    /// Nothing is known of where the goal may be, or of how the search goes.
+    fn begin_search(&mut self) {
         self.discovery.reset();
         self.hints.clear();
         self.hinted_at.clear();

@@ -1,5 +1,7 @@
 //! Is the body where its commands should have brought it: blocked forwards, being stuck, odometry that jumps.
 
+use core::time::Duration;
+
 use homing_core::{Action, MotionOutcome, Odometry, PlanarPose, wrap_angle};
 
 use crate::config::BodyConfig;
@@ -86,10 +88,17 @@ impl Progress {
     }
 }
 
+/// Odometry that is at its origin after a gap in which the body was not heard began anew there.
+const ORIGIN_M: f64 = 0.02;
+const ORIGIN_RAD: f64 = 0.02;
+const ORIGIN_GAP: Duration = Duration::from_secs(2);
+
 /// True if the body cannot have come from one reading to the next: it was carried, or its odometry restarted.
 pub fn jumped(from: &Odometry, to: &Odometry, body: &BodyConfig) -> bool {
     let seconds = to.stamp.since(from.stamp).as_secs_f64();
     let (a, b): (PlanarPose, PlanarPose) = (from.t_odom_base.planar(), to.t_odom_base.planar());
-    a.distance_to(b.x_m, b.y_m) > body.linear_m_s_max * seconds + JUMP_MARGIN_M
+    let begins_at_origin = b.distance_to(0.0, 0.0) < ORIGIN_M && b.yaw_rad.abs() < ORIGIN_RAD;
+    begins_at_origin && a.distance_to(0.0, 0.0) > JUMP_MARGIN_M && to.stamp.since(from.stamp) > ORIGIN_GAP
+        || a.distance_to(b.x_m, b.y_m) > body.linear_m_s_max * seconds + JUMP_MARGIN_M
         || wrap_angle(b.yaw_rad - a.yaw_rad).abs() > body.angular_rad_s_max * seconds + JUMP_MARGIN_RAD
 }

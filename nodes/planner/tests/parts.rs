@@ -174,7 +174,7 @@ fn a_place_that_lied_is_believed_again_only_on_much_better_evidence() {
     let mut filter = GoalFilter::new(FilterConfig::default());
     let place = PlanarPose { x_m: 0.4, y_m: 0.0, yaw_rad: 0.0 };
     filter.join(&seen(&filter, LEVEL, place, 40), 1);
-    let doubts = (0..4).map(|_| filter.doubt(&LEVEL, Sightline::Clear, 1)).collect::<Vec<_>>();
+    let doubts = (0..4).map(|_| filter.doubt(&LEVEL, Sightline::Clear, 15.0, 1)).collect::<Vec<_>>();
     assert_eq!(doubts.last(), Some(&Doubt::Refuted));
     filter.condemn(1);
     assert!(filter.best(1).is_none());

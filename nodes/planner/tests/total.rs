@@ -84,14 +84,18 @@ fn event() -> impl Strategy<Value = StepEvent> {
         blocked,
     });
     let perception = prop_oneof![Just(Perception::Present), Just(Perception::Absent)];
-    (mission, prop::option::of(observation()), prop::option::of(estimate()), prop::option::of(motion), perception)
-        .prop_map(|(mission, observation, estimate, motion, perception)| StepEvent {
+    let remembered = prop::collection::vec(estimate(), 0..3);
+    let estimates = (prop::option::of(estimate()), remembered);
+    (mission, prop::option::of(observation()), estimates, prop::option::of(motion), perception).prop_map(
+        |(mission, observation, (estimate, remembered), motion, perception)| StepEvent {
             mission,
             observation,
             estimate,
+            remembered,
             motion,
             perception,
-        })
+        },
+    )
 }
 
 fn planner(policy: usize) -> Planner {
@@ -169,6 +173,7 @@ fn start(observation: PlannerObservation) -> StepEvent {
         mission: Some(Mission::Start { goal_id: 1 }),
         observation: Some(observation),
         estimate: None,
+        remembered: Vec::new(),
         motion: None,
         perception: Perception::Absent,
     }
@@ -251,6 +256,7 @@ fn a_goal_beside_is_driven_to_turned_to_and_stopped_at() {
             Action::Forward => (0.25, 0.0),
             Action::TurnLeft => (0.0, 15_f64.to_radians()),
             Action::TurnRight => (0.0, -15_f64.to_radians()),
+            Action::Face { milliradians } => (0.0, 1e-3 * f64::from(milliradians)),
             Action::Stop => break,
             Action::Hold => (0.0, 0.0),
         };
@@ -264,7 +270,74 @@ fn a_goal_beside_is_driven_to_turned_to_and_stopped_at() {
     }
     assert_eq!(planner.state().mode, Mode::Arrived);
     assert!(pose.distance_to(goal.x_m, goal.y_m) < 0.2, "{pose:?}");
-    assert!(wrap_angle(pose.yaw_rad - goal.yaw_rad).abs() < 8_f64.to_radians(), "{pose:?}");
+    assert!(wrap_angle(pose.yaw_rad - goal.yaw_rad).abs() < 0.7_f64.to_radians(), "{pose:?}");
+}
+
+/// What perception says of an image taken at `stamp` from the origin: the goal lies 2.5 m ahead.
+fn ahead_of_the_origin(stamp: u64) -> GoalEstimate {
+    let t_camera_goal = Transform::new(Isometry3::translation(0.0, 0.0, 2.5));
+    GoalEstimate {
+        stamp: Stamp(stamp),
+        goal_id: 1,
+        sighting: Sighting::Pose {
+            t_camera_goal,
+            covariance: Matrix6::identity() * 1e-3,
+            n_inliers: 60,
+            rms_rad: 0.003,
+        },
+        n_matches: 80,
+        matched_points: Vec::new(),
+        times: StageTimes::default(),
+    }
+}
+
+#[test]
+fn a_goal_seen_before_its_photo_was_given_is_driven_to_at_once() {
+    let mut planner = planner(1);
+    // Without a mission the body is led forward and about, and sees the goal only at the first moment.
+    for i in 0..10_u32 {
+        let pose = PlanarPose { x_m: 0.1 * f64::from(i), y_m: 0.0, yaw_rad: 0.2 * f64::from(i) };
+        let stamp = u64::from(i) * 200_000_000;
+        let seen = StepEvent { observation: Some(looking_at_a_wall(4.0, stamp, pose)), ..StepEvent::nothing() };
+        assert_eq!(planner.step(Stamp(stamp), &seen), Action::Hold);
+    }
+    let known = planner.map().cells.iter().filter(|c| **c == Cell::Free).count();
+    let here = PlanarPose { x_m: 0.9, y_m: 0.0, yaw_rad: 1.8 };
+    let mut event = start(looking_at_a_wall(4.0, 2_000_000_000, here));
+    event.perception = Perception::Present;
+    event.remembered = vec![ahead_of_the_origin(0)];
+    let action = planner.step(Stamp(2_000_000_000), &event);
+    assert!(planner.map().cells.iter().filter(|c| **c == Cell::Free).count() > known * 9 / 10, "the map was forgotten");
+    let goal = planner.state().goal.clone().unwrap().pose;
+    assert!(goal.distance_to(2.5, 0.0) < 0.01 && goal.yaw_rad.abs() < 0.01, "{goal:?}");
+    assert_eq!((planner.state().mode, action), (Mode::Exploit, Action::TurnRight), "{}", planner.state().reason);
+}
+
+#[test]
+fn an_image_from_before_the_odometry_is_nowhere() {
+    let mut planner = planner(1);
+    let mut event = start(looking_at_a_wall(4.0, 2_000_000_000, PlanarPose::default()));
+    event.remembered = vec![ahead_of_the_origin(1_000_000_000)];
+    planner.step(Stamp(2_000_000_000), &event);
+    assert_eq!((planner.state().mode, planner.state().goal.clone()), (Mode::Explore, None));
+}
+
+#[test]
+fn the_same_goal_given_again_is_where_it_was() {
+    let mut planner = planner(1);
+    let mut event = start(looking_at_a_wall(4.0, 0, PlanarPose::default()));
+    event.estimate = Some(ahead_of_the_origin(0));
+    planner.step(Stamp(0), &event);
+    let cancelled = StepEvent { mission: Some(Mission::Cancel), ..StepEvent::nothing() };
+    planner.step(Stamp(0), &cancelled);
+    assert_eq!((planner.state().mode, planner.state().goal.clone()), (Mode::Idle, None));
+    let mut again = start(looking_at_a_wall(4.0, 200_000_000, PlanarPose::default()));
+    again.perception = Perception::Present;
+    planner.step(Stamp(200_000_000), &again);
+    assert_eq!(planner.state().mode, Mode::Exploit);
+    again.mission = Some(Mission::Start { goal_id: 2 });
+    planner.step(Stamp(200_000_000), &again);
+    assert_eq!((planner.state().mode, planner.state().goal.clone()), (Mode::Explore, None), "another goal");
 }
 
 #[test]

@@ -9,17 +9,23 @@ use crate::interfaces::homing_msgs;
 const NAME: &str = "homing_msgs/NavigationState";
 const MODES: [Mode; 6] = [Mode::Idle, Mode::Explore, Mode::Exploit, Mode::Align, Mode::Arrived, Mode::Failed];
 const ACTIONS: [Action; 5] = [Action::Forward, Action::TurnLeft, Action::TurnRight, Action::Stop, Action::Hold];
+const FACE: u8 = 5;
 
 impl ToMessage<homing_msgs::NavigationState> for NavigationState {
     fn to_message(&self) -> homing_msgs::NavigationState {
         let index = |at: Option<usize>| at.unwrap_or_default() as u8;
         let flat = |points: &[(f64, f64)]| points.iter().flat_map(|p| [p.0, p.1]).collect();
+        let (action, face_mrad) = match self.action {
+            Action::Face { milliradians } => (FACE, milliradians),
+            other => (index(ACTIONS.iter().position(|a| *a == other)), 0),
+        };
         let target = self.target_m.unwrap_or_default();
         let mut message = homing_msgs::NavigationState {
             header: header(self.stamp, Odom::NAME),
             step: self.step,
             mode: index(MODES.iter().position(|m| *m == self.mode)),
-            action: index(ACTIONS.iter().position(|a| *a == self.action)),
+            action,
+            face_mrad,
             x_m: self.pose.x_m,
             y_m: self.pose.y_m,
             yaw_rad: self.pose.yaw_rad,
@@ -48,14 +54,14 @@ impl ToDomain<NavigationState> for homing_msgs::NavigationState {
         let mode = MODES
             .get(usize::from(self.mode))
             .ok_or_else(|| Malformed::new(NAME, format!("mode {} does not exist", self.mode)))?;
-        let action = ACTIONS
-            .get(usize::from(self.action))
+        let face = (self.action == FACE).then_some(Action::Face { milliradians: self.face_mrad });
+        let action = (face.or_else(|| ACTIONS.get(usize::from(self.action)).copied()))
             .ok_or_else(|| Malformed::new(NAME, format!("action {} does not exist", self.action)))?;
         Ok(NavigationState {
             stamp: stamp(&self.header.stamp, NAME)?,
             step: self.step,
             mode: *mode,
-            action: *action,
+            action,
             pose: pose(self.x_m, self.y_m, self.yaw_rad)?,
             goal: if self.goal_known { Some(goal(self)?) } else { None },
             target_m: if self.has_target { Some(target(self)?) } else { None },

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::stage::Stage;
-use super::{FlatViews, OVERLAP_MIN, View, ViewPair, ViewSpec, ViewsError, overlap};
+use super::{Cameras, FlatViews, OVERLAP_MIN, View, ViewPair, ViewSpec, ViewsError, overlap};
 use crate::scene::World;
 
 /// States of the flat, each of which shows in about as many views.
@@ -52,7 +52,19 @@ const GROUPS_MAX: usize = 8;
 /// # Errors
 /// [`ViewsError`] for a size that no image has, and for a flat without floor.
 pub fn draw(seed: u64, spec: &ViewSpec) -> Result<FlatViews, ViewsError> {
-    Intrinsics::from_hfov(spec.width, spec.height, HFOV_RAD.1)?;
+    draw_with(seed, spec, &Cameras::Drawn)
+}
+
+/// The same with other cameras: heights, fields of view, pitch and roll are `cameras`', all else is as in [`draw`].
+///
+/// # Errors
+/// [`ViewsError`] for a size or a field of view that no image has, and for a flat without floor.
+pub fn draw_with(seed: u64, spec: &ViewSpec, cameras: &Cameras) -> Result<FlatViews, ViewsError> {
+    let hfov_rad = match cameras {
+        Cameras::Drawn => HFOV_RAD.1,
+        Cameras::Level { hfov_rad, .. } => *hfov_rad,
+    };
+    Intrinsics::from_hfov(spec.width, spec.height, hfov_rad)?;
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x7669_6577_7061_6972);
     let stages = Stage::of_flat(seed, VARIANTS)?;
     let mut views: Vec<View> = Vec::with_capacity(spec.n_views);
@@ -61,7 +73,7 @@ pub fn draw(seed: u64, spec: &ViewSpec) -> Result<FlatViews, ViewsError> {
             break;
         }
         let size = (rng.random_range(GROUP.0..=GROUP.1) as usize).min(spec.n_views - views.len());
-        let group = draw_group(&stages, spec, size, rng);
+        let group = draw_group(&stages, spec, cameras, size, rng);
         // A picture without a partner is kept only where it completes the set.
         if group.len() > 1 || size == 1 {
             views.extend(group);
@@ -72,13 +84,13 @@ pub fn draw(seed: u64, spec: &ViewSpec) -> Result<FlatViews, ViewsError> {
 }
 
 /// Up to `size` views around one point of interest.
-fn draw_group(stages: &[Stage], spec: &ViewSpec, size: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
+fn draw_group(stages: &[Stage], spec: &ViewSpec, cameras: &Cameras, size: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
     let mut group: Vec<View> = Vec::with_capacity(size);
     let Some(interest) = point_of_interest(&stages[0], rng) else { return group };
     while group.len() < size {
         let picture = (0..PICTURES_MAX).find_map(|_| {
             let stage = &stages[rng.random_range(0..stages.len() as u64) as usize];
-            let (camera, t_world_camera) = draw_camera(stage, spec, interest, &group, rng)?;
+            let (camera, t_world_camera) = draw_camera(stage, spec, cameras, interest, &group, rng)?;
             let view = stage.picture(camera, t_world_camera)?;
             (group.is_empty() || group.iter().any(|other| overlap(other, &view) >= OVERLAP_MIN)).then_some(view)
         });
@@ -108,11 +120,15 @@ fn random_place(stage: &Stage, rng: &mut ChaCha8Rng) -> (f64, f64) {
 fn draw_camera(
     stage: &Stage,
     spec: &ViewSpec,
+    cameras: &Cameras,
     interest: (f64, f64),
     group: &[View],
     rng: &mut ChaCha8Rng,
 ) -> Option<(Intrinsics, Transform<World, Camera>)> {
-    let hfov_rad = rng.random_range(HFOV_RAD.0..HFOV_RAD.1);
+    let hfov_rad = match cameras {
+        Cameras::Drawn => rng.random_range(HFOV_RAD.0..HFOV_RAD.1),
+        Cameras::Level { hfov_rad, .. } => *hfov_rad,
+    };
     let camera = Intrinsics::from_hfov(spec.width, spec.height, hfov_rad).ok()?;
     let (place, yaw_rad) = (0..PLACES_MAX).find_map(|_| {
         let place = random_place(stage, rng);
@@ -125,10 +141,15 @@ fn draw_camera(
             && stage.range_m(place, bearing_rad, distance_m - SIGHT_SLACK_M).is_none();
         suits.then_some((place, yaw_rad))
     })?;
-    let height_m = stage.floor_z_m() + rng.random_range(HEIGHT_M.0..HEIGHT_M.1);
-    let pitch_rad = rng.random_range(-PITCH_RAD_MAX..PITCH_RAD_MAX);
-    let roll_rad = rng.random_range(-ROLL_RAD_MAX..ROLL_RAD_MAX);
-    let at = Vector3::new(place.0, place.1, height_m);
+    let (height_m, pitch_rad, roll_rad) = match cameras {
+        Cameras::Drawn => (
+            rng.random_range(HEIGHT_M.0..HEIGHT_M.1),
+            rng.random_range(-PITCH_RAD_MAX..PITCH_RAD_MAX),
+            rng.random_range(-ROLL_RAD_MAX..ROLL_RAD_MAX),
+        ),
+        Cameras::Level { height_m, .. } => (*height_m, 0.0, 0.0),
+    };
+    let at = Vector3::new(place.0, place.1, stage.floor_z_m() + height_m);
     Some((camera, looking(at, yaw_rad, pitch_rad, roll_rad)))
 }
 

@@ -14,10 +14,11 @@ mod stage;
 use homing_core::{Camera, DepthImage, Intrinsics, IntrinsicsError, RgbImage, Transform};
 use thiserror::Error;
 
-pub use draw::draw;
+pub use draw::{draw, draw_with};
 pub use overlap::{agrees, overlap, seen_share};
 
 use crate::arena::ArenaError;
+use crate::constants::{CAMERA_HEIGHT, CAMERA_HEIGHT_M, CAMERA_HFOV_RAD, CAMERA_WIDTH};
 use crate::scene::World;
 
 /// How many views of what size.
@@ -35,6 +36,34 @@ impl Default for ViewSpec {
     fn default() -> Self {
         Self { n_views: 16, width: 320, height: 240 }
     }
+}
+
+impl ViewSpec {
+    /// Views of the size that the robot's own camera has.
+    #[must_use]
+    pub fn of_robot(n_views: usize) -> Self {
+        Self { n_views, width: CAMERA_WIDTH, height: CAMERA_HEIGHT }
+    }
+}
+
+/// What takes the pictures.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub enum Cameras {
+    /// For each picture a camera of its own: height, field of view, pitch and roll are drawn. What training needs.
+    #[default]
+    Drawn,
+    /// The same level camera for all: what a robot sees, and is shown.
+    Level {
+        /// Above the floor, metres.
+        height_m: f64,
+        /// Horizontal field of view, radians.
+        hfov_rad: f64,
+    },
+}
+
+impl Cameras {
+    /// The robot's own camera.
+    pub const ROBOT: Self = Self::Level { height_m: CAMERA_HEIGHT_M, hfov_rad: CAMERA_HFOV_RAD };
 }
 
 /// One picture.

@@ -169,6 +169,7 @@ impl Lockstep {
                 t_base_camera: self.robot.capabilities().t_base_camera,
             }),
             estimate: Some(estimate.clone()),
+            remembered: Vec::new(),
             motion: self.motion.take(),
             perception: Perception::Present,
         }

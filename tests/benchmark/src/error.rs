@@ -1,10 +1,11 @@
 //! Why an episode could not be run.
 
-use homing_core::{BridgeError, IntrinsicsError};
+use homing_core::{BridgeError, FrameSizeError, IntrinsicsError};
 use homing_perception::PerceptionError;
 use homing_planner::ConfigError;
 use homing_sim::arena::ArenaError;
 use homing_sim::episode::DrawError;
+use homing_sim::views::ViewsError;
 use thiserror::Error;
 
 /// A fault of the benchmark or its parts; a goal that is not reached is none.
@@ -28,6 +29,18 @@ pub enum RunError {
     /// The simulated body failed.
     #[error("the body: {0}")]
     Body(#[from] BridgeError),
+    /// A flat gave no views.
+    #[error("views of a flat: {0}")]
+    Views(#[from] ViewsError),
+    /// Colour and depth do not belong together.
+    #[error(transparent)]
+    Frame(#[from] FrameSizeError),
+    /// Recorded frames cannot be read.
+    #[error("recorded frames: {0}")]
+    Recording(Box<dyn core::error::Error + Send + Sync>),
+    /// A picture whose size does not fit its data.
+    #[error("a picture: {0}")]
+    Image(#[source] homing_core::ImageError),
     /// No flat offers a pair of views as asked for.
     #[error(
         "none of {flats} flats offers two views {distance_m:.2} m and {heading_deg:.0} deg apart that share enough"
@@ -40,9 +53,6 @@ pub enum RunError {
         /// Flats tried.
         flats: u64,
     },
-    /// An image that is none.
-    #[error("the camera's images: {0}")]
-    Frame(String),
     /// No thread to work on.
     #[error("no worker threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -2,11 +2,15 @@
 //!
 //! [`episode::run_episode`] is the distributed system's loop without its network: the same events, so the same actions.
 //! [`bench::bench`] runs one episode in each of many generated flats, scores it strictly and says why it failed if it did.
+//! [`recall::recall`] asks for goals that were seen long ago.
+//! [`perception`] measures the eyes alone, on pairs of images.
 
 pub mod bench;
 pub mod cause;
 pub mod episode;
 mod error;
+pub mod perception;
+pub mod recall;
 pub mod report;
 pub mod visual_target;
 

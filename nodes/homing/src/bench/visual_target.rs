@@ -13,6 +13,7 @@ use homing_sim::Viewpoint;
 use homing_sim::views::OVERLAP_MIN;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::can_be_written;
 use crate::Ended;
 use crate::photo::{field_of_view, png};
 
@@ -53,11 +54,11 @@ pub struct VisualTargetArgs {
 
 pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
     // Known before the minutes are spent: can the report be written?
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot write {}", folder.display()))?;
+    }
     for path in args.json.iter().cloned().chain(args.out.iter().map(|folder| folder.join("report.json"))) {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let said = || format!("cannot write {}", path.display());
-        std::fs::create_dir_all(folder).with_context(said)?;
-        std::fs::File::options().create(true).append(true).open(&path).with_context(said)?;
+        can_be_written(&path)?;
     }
     let camera = Viewpoint { hfov_rad: args.hfov_deg.to_radians(), ..Viewpoint::default() };
     let pairs = PairSpec { n_each: usize::from(args.pairs), seed: args.seed, camera, overlap_min: args.overlap_min };
@@ -80,7 +81,7 @@ fn n_won(runs: &[PairRun]) -> usize {
 /// Features of a row, by what they are called in the manifest.
 const FEATURES: [(&str, &str, &str, Solver); 3] = [
     ("R2D2-like, EPnP", "homing-r2d2", "mutual-nearest", Solver::Papers),
-    ("ours", "homing-extractor", "homing-matcher", Solver::Ours),
+    ("ours", "homing-extractor", "homing-matcher-accurate", Solver::Ours),
     ("SIFT", "sift", "mutual-nearest", Solver::Ours),
 ];
 

@@ -157,6 +157,7 @@ fn action_name(action: Action) -> &'static str {
         Action::Forward => "forward",
         Action::TurnLeft => "turn left",
         Action::TurnRight => "turn right",
+        Action::Face { .. } => "face the goal's way",
         Action::Stop => "stop",
         Action::Hold => "hold",
     }

@@ -23,6 +23,7 @@ pub fn from_arguments(arguments: &[String]) -> Fallible<(FeatureChoice, Percepti
     }
     if let Some(name) = value("--matcher") {
         choice.matcher = MatcherChoice::resolve(&model(name)?, &folder)?;
+        choice.matcher_config.confidence_min = choice.matcher.confidence_min();
     }
     if let Some(n) = value("--keypoints") {
         config.sift.keypoints_max = n.parse()?;

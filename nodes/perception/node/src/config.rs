@@ -1,5 +1,6 @@
 //! The process's TOML file.
 
+use homing_perception::memory::MemoryConfig;
 use homing_perception::onnx::{ChoiceError, FeatureChoice};
 use homing_perception::{PerceptionConfig, PoseSolver};
 use homing_protocol::process::SessionSettings;
@@ -23,6 +24,8 @@ pub struct Config {
     pub gates: GateSettings,
     /// From matches to a pose.
     pub pose: PoseSettings,
+    /// What was seen before.
+    pub memory: MemorySettings,
     /// Threads OpenCV may use; 0 leaves its own choice.
     pub threads: u16,
 }
@@ -47,6 +50,16 @@ pub struct PoseSettings {
     pub camera_down_deg: Option<f64>,
     /// The same of the camera that takes the photos.
     pub goal_down_deg: Option<f64>,
+}
+
+/// `[memory]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MemorySettings {
+    /// Most keyframes remembered, about 1 MB each; 0 remembers nothing.
+    pub keyframes_max: usize,
+    /// Keyframes examined when a new goal is given.
+    pub candidates_max: usize,
 }
 
 /// The solvers' names in the file.
@@ -75,6 +88,13 @@ impl From<SolverName> for PoseSolver {
     }
 }
 
+impl Default for MemorySettings {
+    fn default() -> Self {
+        let MemoryConfig { keyframes_max, candidates_max, .. } = MemoryConfig::default();
+        Self { keyframes_max, candidates_max }
+    }
+}
+
 impl Default for GateSettings {
     fn default() -> Self {
         let gates = PerceptionConfig::default().gates;
@@ -98,6 +118,12 @@ impl Config {
         config.goal_down_rad = self.pose.goal_down_deg.map(f64::to_radians);
         config.threads = (self.threads > 0).then_some(self.threads);
         config
+    }
+
+    /// The memory's configuration.
+    pub fn memory(&self) -> MemoryConfig {
+        let MemorySettings { keyframes_max, candidates_max } = self.memory;
+        MemoryConfig { keyframes_max, candidates_max, ..MemoryConfig::default() }
     }
 
     /// The features it names.

@@ -32,8 +32,8 @@ pub struct MatcherSettings {
     pub method: ModelSetting,
     /// Largest ratio of the ratio test (mutual-nearest).
     pub ratio_max: f32,
-    /// Smallest confidence of a match (dual-softmax and models).
-    pub confidence_min: f32,
+    /// Smallest confidence of a match (dual-softmax and models); where none is named, the model's own.
+    pub confidence_min: Option<f32>,
 }
 
 /// `[runtime]`.
@@ -117,7 +117,7 @@ impl Default for MatcherSettings {
         Self {
             method: ModelSetting::Named(MatcherChoice::default().name().to_owned()),
             ratio_max: PerceptionConfig::default().ratio_max,
-            confidence_min: MatcherConfig::default().confidence_min,
+            confidence_min: None,
         }
     }
 }
@@ -145,11 +145,13 @@ pub fn choice(
         name: runtime.provider.clone(),
         known: ProviderChoice::NAMES.map(|(name, _)| name).join(", "),
     })?;
+    let method = MatcherChoice::resolve(&matcher.method.name(), &runtime.models)?;
+    let confidence_min = matcher.confidence_min.unwrap_or_else(|| method.confidence_min());
     Ok(FeatureChoice {
         extractor: ExtractorChoice::resolve(&features.extractor.name(), &runtime.models)?,
-        matcher: MatcherChoice::resolve(&matcher.method.name(), &runtime.models)?,
+        matcher: method,
         extractor_config: ExtractorConfig { keypoints_max: features.keypoints_max, side_max_px: features.side_max_px },
-        matcher_config: MatcherConfig { keypoints_max: features.keypoints_max, confidence_min: matcher.confidence_min },
+        matcher_config: MatcherConfig { keypoints_max: features.keypoints_max, confidence_min },
         run: RunConfig { provider: provider.1, threads: runtime.threads },
         library: (!runtime.library.as_os_str().is_empty()).then(|| runtime.library.clone()),
     })

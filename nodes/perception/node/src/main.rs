@@ -31,7 +31,7 @@ fn main() -> ExitCode {
 #[tokio::main]
 async fn run(config: Config) -> anyhow::Result<()> {
     let choice = config.choice().map_err(Unusable::new)?;
-    let mut answerer = Answerer::new(config.perception(), &choice).map_err(Unusable::new)?;
+    let mut answerer = Answerer::new(config.perception(), config.memory(), &choice).map_err(Unusable::new)?;
     tracing::info!("features: {} + {}", choice.extractor.name(), choice.matcher.name());
     let session = Session::open(&config.session.session("perception"))?;
     let colors = session.subscribe(&topics::CAMERA_COLOR, 2)?;
@@ -61,8 +61,7 @@ async fn run(config: Config) -> anyhow::Result<()> {
                 .and_then(|photo| tokio::task::block_in_place(|| answerer.show(photo))),
         };
         match answers {
-            Ok(Some(estimate)) => estimates.publish(&estimate.to_message())?,
-            Ok(None) => {}
+            Ok(answers) => answers.iter().try_for_each(|estimate| estimates.publish(&estimate.to_message()))?,
             // Whatever came was not usable: say so, and go on with the next.
             Err(cause) => tracing::warn!("ignored: {cause:#}"),
         }
@@ -75,9 +74,9 @@ fn frame_answers(
     answerer: &mut Answerer,
     frame: Option<RgbdFrame>,
     stamp: homing_core::Stamp,
-) -> anyhow::Result<Option<homing_core::GoalEstimate>> {
+) -> anyhow::Result<Vec<homing_core::GoalEstimate>> {
     Ok(match frame {
-        Some(frame) => Some(tokio::task::block_in_place(|| answerer.look(frame))?),
-        None => answerer.again(stamp),
+        Some(frame) => vec![tokio::task::block_in_place(|| answerer.look(frame))?],
+        None => answerer.again(stamp).into_iter().collect(),
     })
 }

@@ -47,7 +47,7 @@ pub enum ExtractorChoice {
 }
 
 /// What pairs keypoints.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum MatcherChoice {
     /// Mutual nearest neighbours with a ratio test.
     #[default]
@@ -62,6 +62,8 @@ pub enum MatcherChoice {
         file: ModelFile,
         /// Hash of the extractor it was trained on, where the manifest tells.
         extractor_sha256: Option<String>,
+        /// Smallest confidence of a match that serves it best, where the manifest tells.
+        confidence_min: Option<f32>,
     },
 }
 
@@ -117,13 +119,24 @@ impl MatcherChoice {
                 let contract = MatcherContract::named(&entry.contract)
                     .ok_or_else(|| unknown("contract", &entry.contract, contracts()))?;
                 let file = entry.model_file(folder);
-                Ok(Self::Model { contract, file, extractor_sha256: entry.extractor_sha256 })
+                let Entry { extractor_sha256, confidence_min, .. } = entry;
+                Ok(Self::Model { contract, file, extractor_sha256, confidence_min })
             }
             ModelName::File { contract, file } => {
                 let known =
                     MatcherContract::named(contract).ok_or_else(|| unknown("contract", contract, contracts()))?;
-                Ok(Self::Model { contract: known, file: file.clone(), extractor_sha256: None })
+                let file = file.clone();
+                Ok(Self::Model { contract: known, file, extractor_sha256: None, confidence_min: None })
             }
+        }
+    }
+
+    /// Smallest confidence of a match where the configuration names none: the model's own, else the common one.
+    #[must_use]
+    pub fn confidence_min(&self) -> f32 {
+        match self {
+            Self::Model { confidence_min: Some(own), .. } => *own,
+            _ => MatcherConfig::default().confidence_min,
         }
     }
 
@@ -239,7 +252,7 @@ impl FeatureChoice {
 
     /// Before anything is loaded: a matcher that is a model knows the extractors it was trained on.
     fn check_families(&self) -> Result<(), ChoiceError> {
-        let MatcherChoice::Model { contract, file, extractor_sha256 } = &self.matcher else { return Ok(()) };
+        let MatcherChoice::Model { contract, file, extractor_sha256, .. } = &self.matcher else { return Ok(()) };
         match &self.extractor {
             ExtractorChoice::Model { contract: extractor, file: trained } if contract.takes().contains(extractor) => {
                 match extractor_sha256 {

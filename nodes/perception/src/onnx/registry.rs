@@ -52,6 +52,9 @@ pub struct Entry {
     /// Of a matcher: the sha256 of the extractor whose descriptors it was trained on.
     #[serde(default)]
     pub extractor_sha256: Option<String>,
+    /// Of a matcher: the smallest confidence of a match, 0 to 1, that served best on validation.
+    #[serde(default)]
+    pub confidence_min: Option<f32>,
 }
 
 /// How a model was made.
@@ -91,6 +94,9 @@ impl Manifest {
             };
             if !known {
                 return Err(format!("model {}: contract \"{}\" is unknown", entry.name, entry.contract));
+            }
+            if entry.confidence_min.is_some_and(|limit| !(0.0..=1.0).contains(&limit)) {
+                return Err(format!("model {}: confidence_min is not in 0..1", entry.name));
             }
             // A file elsewhere is named by its path in the configuration, not here.
             if Path::new(&entry.file).file_name() != Some(entry.file.as_ref()) {
@@ -168,6 +174,9 @@ mod tests {
         assert_eq!((extractor.sha256.as_str(), extractor.contract.as_str()), ("ab".repeat(32).as_str(), "homing"));
         assert_eq!((extractor.training.commit.as_str(), &extractor.extractor_sha256), ("0123abc", &None));
         assert!(read.find("other", Role::Extractor).is_none());
+        assert_eq!(found.confidence_min, None);
+        let limited = manifest(|v| v["models"][1]["confidence_min"] = 0.25.into()).unwrap();
+        assert_eq!(limited.find("homing", Role::Matcher).unwrap().confidence_min, Some(0.25));
         assert_eq!(read.names(Role::Matcher).collect::<Vec<_>>(), ["homing-matcher"]);
     }
 
@@ -179,6 +188,7 @@ mod tests {
         assert!(reason(&|v| v["models"][0]["file"] = "../x.onnx".into()).contains("plain name"));
         assert!(reason(&|v| v["models"][0] = v["models"][1].clone()).contains("homing-matcher is listed twice"));
         assert!(reason(&|v| drop(v["models"][0]["sha256"].take())).contains("invalid type: null"));
+        assert!(reason(&|v| v["models"][1]["confidence_min"] = 2.into()).contains("confidence_min is not in 0..1"));
         assert!(Manifest::parse("{").unwrap_err().contains("line 1"));
     }
 

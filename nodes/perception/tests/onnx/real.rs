@@ -24,7 +24,7 @@ fn choice(matcher: impl Fn(homing_perception::onnx::ModelFile) -> MatcherChoice)
 }
 
 fn lighterglue(file: homing_perception::onnx::ModelFile) -> MatcherChoice {
-    MatcherChoice::Model { contract: MatcherContract::LighterGlue, file, extractor_sha256: None }
+    MatcherChoice::Model { contract: MatcherContract::LighterGlue, file, extractor_sha256: None, confidence_min: None }
 }
 
 fn photo(folder: &Path, number: u32) -> RgbImage {

@@ -125,7 +125,10 @@ fn a_model_whose_shapes_show_only_when_it_runs_is_refused_at_the_start_too() {
 #[test]
 fn parts_that_do_not_belong_together_are_refused_before_anything_is_loaded() {
     let file = ModelFile { path: "/nowhere.onnx".into(), sha256: "0".repeat(64) };
-    let model = |contract| MatcherChoice::Model { contract, file: file.clone(), extractor_sha256: None };
+    let model = |contract| {
+        let file = file.clone();
+        MatcherChoice::Model { contract, file, extractor_sha256: None, confidence_min: None }
+    };
     let from = |contract| ExtractorChoice::Model { contract, file: file.clone() };
     for (extractor, matcher, expected) in [
         (ExtractorChoice::Sift, MatcherContract::LighterGlue, "extractor xfeat"),
@@ -149,6 +152,7 @@ fn a_matcher_goes_with_the_very_extractor_it_was_trained_on() {
         contract: MatcherContract::Homing,
         file: file("1"),
         extractor_sha256: Some("2".repeat(64)),
+        confidence_min: None,
     };
     let extractor = ExtractorChoice::Model { contract: ExtractorContract::Homing, file: file("3") };
     let choice = FeatureChoice { extractor, matcher, ..FeatureChoice::default() };
@@ -169,6 +173,7 @@ fn a_matcher_for_descriptors_of_another_length_is_refused() {
             contract: MatcherContract::LightGlue,
             file: folder.model("lightglue.onnx", &lightglue(256).bytes()),
             extractor_sha256: None,
+            confidence_min: None,
         },
         library: Some(library),
         ..FeatureChoice::default()

@@ -35,6 +35,8 @@ pub struct Driver {
     session_id: u64,
     sequence: u64,
     mission: Option<Active>,
+    /// The newest moment without a mission, not yet taken in.
+    resting: Option<PlannerObservation>,
     announced: Option<PlannerMission>,
     perception: Answering,
     /// Waits for perception that ended without an answer, in a row.
@@ -80,6 +82,7 @@ impl Driver {
             session_id: rand::random(),
             sequence: 0,
             mission: None,
+            resting: None,
             announced: None,
             perception: Answering::InTime,
             misses: 0,
@@ -121,10 +124,26 @@ impl Driver {
     pub fn act(&mut self, session: &Session) -> anyhow::Result<()> {
         self.send_photo()?;
         self.send_again()?;
+        if self.mission.is_none() {
+            self.look_around();
+        }
         if let Some((observation, perception)) = self.complete_moment(session) {
             self.step(observation, perception)?;
         }
         Ok(())
+    }
+
+    /// Without a mission, whoever moves the body shows it around: the map grows, and the odometry is remembered, so that a
+    /// goal that is seen on the way can be found later. One moment late: the newest may be the first of a mission.
+    fn look_around(&mut self) {
+        let from = self.resting.as_ref().map_or(Stamp(0), |o| Stamp(o.odometry.stamp.0.saturating_add(1)));
+        let Some(newest) = self.moments.newest(from) else { return };
+        if let Some(observation) = self.resting.replace(newest) {
+            let stamp = observation.odometry.stamp;
+            let mission = self.announced.take();
+            let event = StepEvent { mission, observation: Some(observation), ..StepEvent::nothing() };
+            self.planner.step(stamp, &event);
+        }
     }
 
     /// Tells the body to stand still, and ends the mission for whoever waits for it.
@@ -149,7 +168,7 @@ impl Driver {
     /// The robot's clock began anew: what was decided before it is void.
     fn start_over(&mut self) {
         tracing::warn!("the robot's clock began anew: going on from its new beginning");
-        self.closing = None;
+        (self.closing, self.resting) = (None, None);
         if let Some(active) = &mut self.mission {
             (active.command, active.result, active.waiting_since) = (None, None, None);
             active.next_from = Stamp(0);
@@ -242,9 +261,12 @@ impl Driver {
         active.waiting_since = None;
         let motion = active.result.take().map(|r| r.outcome);
         active.path_length_m += motion.map_or(0.0, |m| m.moved.distance_to(0.0, 0.0));
+        // The newest answer speaks of the moment at hand, those before of what was seen long ago.
+        let mut remembered = self.moments.close(stamp);
         let event = StepEvent {
             mission: self.announced.take(),
-            estimate: self.moments.close(stamp),
+            estimate: remembered.pop(),
+            remembered,
             observation: Some(observation),
             motion,
             perception,
@@ -337,6 +359,7 @@ fn begin(driver: &mut Driver, mission: Option<Mission>) {
         Some(Mission::Start(id, photo)) => {
             tracing::info!(goal = photo.id, "mission begins");
             driver.moments.clear();
+            driver.resting = None;
             driver.announced = Some(PlannerMission::Start { goal_id: photo.id });
             driver.perception = Answering::InTime;
             driver.mission = Some(Active {

@@ -101,13 +101,11 @@ impl Moments {
         })
     }
 
-    /// Takes the newest answer up to `stamp`; forgets everything before the moment at `stamp`.
-    pub fn close(&mut self, stamp: Stamp) -> Option<GoalEstimate> {
-        let newest = self.estimates.range(..=stamp).next_back().map(|(at, _)| *at);
-        let estimate = newest.and_then(|at| self.estimates.remove(&at));
-        self.estimates.retain(|at, _| *at > stamp);
+    /// Takes the answers up to `stamp`, oldest first; forgets everything before the moment at `stamp`.
+    pub fn close(&mut self, stamp: Stamp) -> Vec<GoalEstimate> {
+        let later = self.estimates.split_off(&Stamp(stamp.0.saturating_add(1)));
         self.waiting.retain(|at, _| *at > stamp);
-        estimate
+        std::mem::replace(&mut self.estimates, later).into_values().collect()
     }
 
     /// Forgets all moments: the robot's clock began anew, or the goal changed.

@@ -60,6 +60,9 @@ impl Planner {
                 Decision::new(action(step), format!("closing in on the goal, {distance_m:.2} m away"))
             }
             Approach::Align(turn) => Decision::new(action(turn), "turning to the photo's heading"),
+            Approach::Face(milliradians) => {
+                Decision::new(Action::Face { milliradians }, "turning the last bit to the photo's heading")
+            }
             Approach::Arrived => {
                 self.state.mode = Mode::Arrived;
                 Decision::new(Action::Stop, "arrived: position, heading and view agree")

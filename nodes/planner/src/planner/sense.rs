@@ -5,7 +5,7 @@ use homing_core::{
     Sighting, wrap_angle,
 };
 
-use super::{Decision, HINT_STEPS, HINTS_MAX, ODOMETRY_KEPT, Planner, REJECTED_MAX};
+use super::{CLOCK_RESTART, Decision, HINT_STEPS, HINTS_MAX, ODOMETRY_KEPT, Planner, REJECTED_MAX};
 use crate::angles::distance;
 use crate::event::PlannerObservation;
 use crate::evidence::{View, weigh};
@@ -20,24 +20,31 @@ impl Planner {
         if !reading.t_odom_base.is_finite() {
             return Err(Decision::hold("the odometry is not a number"));
         }
-        if !self.odometry.push(*reading) {
+        if last.is_some_and(|last| last.stamp.since(reading.stamp) > CLOCK_RESTART) {
+            self.begin_anew(reading);
+        } else if !self.odometry.push(*reading) {
             self.n_rejected += 1;
             if self.n_rejected > REJECTED_MAX {
-                self.odometry = OdometryBuffer::new(ODOMETRY_KEPT);
-                self.n_rejected = 0;
+                self.begin_anew(reading);
             }
             return Err(Decision::hold("the odometry is older than the last"));
         }
         self.n_rejected = 0;
         if last.is_some_and(|last| jumped(&last, reading, &self.config.body)) {
-            self.odometry = OdometryBuffer::new(ODOMETRY_KEPT);
-            self.odometry.push(*reading);
-            self.begin_map();
-            self.restarted = true;
+            self.begin_anew(reading);
         }
         self.state.stamp = reading.stamp;
         self.state.pose = reading.t_odom_base.planar();
         Ok(())
+    }
+
+    /// Another odometry began: poses and places of the old one mean nothing in it.
+    fn begin_anew(&mut self, reading: &Odometry) {
+        self.odometry = OdometryBuffer::new(ODOMETRY_KEPT);
+        self.odometry.push(*reading);
+        self.n_rejected = 0;
+        self.begin_map();
+        self.restarted = true;
     }
 
     /// A forward that did not come through is an obstacle that depth does not show.
@@ -105,10 +112,26 @@ impl Planner {
         }
     }
 
+    /// Fuses what was found in an image from before. It speaks for a place, and never against one: nobody looks there now.
+    pub(super) fn recall(&mut self, observation: &PlannerObservation, estimate: &GoalEstimate) {
+        if Some(estimate.goal_id) != self.goal_id {
+            return;
+        }
+        let Some(t_odom_base) = self.odometry.at(estimate.stamp) else { return };
+        let Sighting::Pose { t_camera_goal, covariance, n_inliers, .. } = &estimate.sighting else { return };
+        let evidence = weigh(*n_inliers, &estimate.matched_points, &observation.intrinsics, None);
+        let t_base_camera = &observation.t_base_camera;
+        let measured =
+            self.filter.measure(estimate.stamp, &t_odom_base, t_base_camera, t_camera_goal, covariance, evidence);
+        let Some(mut measured) = measured else { return };
+        self.filter.age(&mut measured, self.odometry.n_since(estimate.stamp));
+        self.filter.join(&measured, self.state.step);
+    }
+
     fn doubt(&mut self, pose: &PlanarPose) -> Doubt {
         let Some(best) = self.filter.best(self.state.step) else { return Doubt::None };
         let view = clear_view(self.mapper.map(), (pose.x_m, pose.y_m), (best.pose.x_m, best.pose.y_m));
-        self.filter.doubt(pose, view, self.state.step)
+        self.filter.doubt(pose, view, self.config.switches.n_inliers_min as f64, self.state.step)
     }
 
     fn hint(&mut self, pose: &PlanarPose, bearing_rad: f64, n_inliers: usize) {

@@ -252,13 +252,17 @@ impl World {
                 let noise = self.noise(0.007 * self.faults.odometry);
                 self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + sign * 15_f64.to_radians() + noise);
             }
+            Action::Face { milliradians } => {
+                let noise = self.noise(0.007 * self.faults.odometry);
+                self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + 1e-3 * f64::from(milliradians) + noise);
+            }
             Action::Stop | Action::Hold => {}
         }
         self.path_m += before.distance_to(self.pose.x_m, self.pose.y_m);
         self.clock = Stamp(self.clock.0 + 200_000_000);
         let (a, b): (Transform<Odom, Base>, Transform<Odom, Base>) = (before.to_transform(), self.pose.to_transform());
         let mut moved = (a.inverse() * b).planar_of_base();
-        if matches!(action, Action::Forward | Action::TurnLeft | Action::TurnRight) {
+        if !matches!(action, Action::Stop | Action::Hold) {
             moved.x_m += self.noise(0.002 * self.faults.odometry);
             moved.y_m += self.noise(0.001 * self.faults.odometry);
             moved.yaw_rad += self.noise(0.0015 * self.faults.odometry);

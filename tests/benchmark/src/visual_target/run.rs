@@ -149,13 +149,12 @@ fn frame(arena: &Arena, camera: &Viewpoint, sensor: Sensor, at: FloorPose) -> Re
         Sensor::RgbD => seen.depth,
         Sensor::Rgb => no_depth(&seen.rgb)?,
     };
-    RgbdFrame::new(Stamp(0), Arc::new(seen.rgb), Arc::new(depth), seen.camera)
-        .map_err(|e| RunError::Frame(e.to_string()))
+    Ok(RgbdFrame::new(Stamp(0), Arc::new(seen.rgb), Arc::new(depth), seen.camera)?)
 }
 
 fn no_depth(rgb: &RgbImage) -> Result<DepthImage, RunError> {
     let n = rgb.width() as usize * rgb.height() as usize;
-    DepthImage::from_metres(rgb.width(), rgb.height(), vec![0.0; n]).map_err(|e| RunError::Frame(e.to_string()))
+    DepthImage::from_metres(rgb.width(), rgb.height(), vec![0.0; n]).map_err(RunError::Image)
 }
 
 /// The wanted pose, or the nearest to it on the straight way from `from` at which the body can stand.

@@ -1,6 +1,6 @@
 //! A sheet of pictures: start view, target view and final view of some pairs, side by side.
 
-use homing_core::{ImageError, RgbImage};
+use homing_core::RgbImage;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::Viewpoint;
 
@@ -35,5 +35,5 @@ pub fn contact_sheet(rows: &[(&TargetPair, &PairRun)], camera: &Viewpoint) -> Re
             }
         }
     }
-    RgbImage::new(width as u32, height as u32, data).map_err(|e: ImageError| RunError::Frame(e.to_string()))
+    RgbImage::new(width as u32, height as u32, data).map_err(RunError::Image)
 }

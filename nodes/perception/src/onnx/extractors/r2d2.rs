@@ -41,13 +41,15 @@ pub const CONTRACT: Contract = Contract {
     ],
     explanation: "The image is red, green and blue, 0 to 1, less ImageNet's mean and over its deviation; one scale. Keypoints \
                   are local maxima (3x3) of the repeatability where both maps reach 0.7, their score is the product of the \
-                  two.",
+                  two. The maps are of the image's size; the descriptors may instead have a cell for every 8x8 pixels.",
 };
 
 /// ImageNet's mean and deviation per channel.
 const PIXELS: Pixels = Pixels::Rgb { mean: [0.485, 0.456, 0.406], sd: [0.229, 0.224, 0.225] };
-/// Sides of the image are multiples of this.
-const MULTIPLE: usize = 8;
+/// Sides of the image are multiples of this: a pyramid down to 1/32 needs no less.
+const MULTIPLE: usize = 32;
+/// Side of a cell of descriptors that are not of the image's size, pixels.
+const CELL: usize = 8;
 /// As published, like the rule.
 const RELIABILITY_MIN: f32 = 0.7;
 const RULE: PeakRule = PeakRule { radius: 1, min: 0.7, border: 0 };
@@ -80,8 +82,9 @@ impl FeatureExtractor for R2d2 {
 fn read(outputs: &[Output<'_>], prepared: &Prepared, config: &ExtractorConfig) -> Result<Features, String> {
     let [descriptors, reliability, repeatability] = outputs else { return Err(format!("{} outputs", outputs.len())) };
     let (width, height) = (prepared.width, prepared.height);
+    let cell = if sides(descriptors) == (width, height) { 1 } else { CELL };
     check_sizes(&[
-        ("descriptors", sides(descriptors), (width, height)),
+        ("descriptors", sides(descriptors), (width / cell, height / cell)),
         ("reliability", sides(reliability), (width, height)),
         ("repeatability", sides(repeatability), (width, height)),
     ])?;
@@ -94,7 +97,8 @@ fn read(outputs: &[Output<'_>], prepared: &Prepared, config: &ExtractorConfig) -
     keep_strongest(&mut found, config.keypoints_max);
     let keypoints: Vec<Keypoint> =
         found.iter().map(|p| Keypoint { x_px: p.x as f32, y_px: p.y as f32, score: p.value }).collect();
-    let map = DenseMap { planes: descriptors.floats(), dimension: DIMENSION, columns: width, rows: height, cell: 1.0 };
+    let (columns, rows) = sides(descriptors);
+    let map = DenseMap { planes: descriptors.floats(), dimension: DIMENSION, columns, rows, cell: cell as f32 };
     let described = describe(&map, &keypoints);
     Ok(features(keypoints, described, DIMENSION))
 }

@@ -1,29 +1,20 @@
-//! `homing bench`: many episodes in this process, as fast as the machine goes.
-
-mod visual_target;
+//! `homing bench`: many episodes in this process.
 
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use clap::{Args, Subcommand};
+use clap::Args;
 use homing_benchmark::{BenchOptions, EpisodeRow, bench};
 use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::{can_be_written, seeds};
 use crate::Ended;
 use crate::demo::Policy;
 use crate::settings::FeatureArgs;
 
-/// Runs one curved episode of 3 to 10 m in the flat of each seed, and reports success, SPL and final errors.
-///
-/// The libraries are those of the processes, called in lockstep without the network: the same decisions, faster. Of each
-/// episode, as it ends: won or not, steps, way driven and shortest, SPL, distance and heading left at the end; the steps at
-/// which the goal first came into view and was first found; right and wrong estimates, and steps with a wrong goal in mind.
 #[derive(Args)]
-#[command(args_conflicts_with_subcommands = true)]
-pub struct BenchArgs {
-    #[command(subcommand)]
-    other: Option<Other>,
+pub struct NavigationArgs {
     /// Seeds, as A..B: from A to B without B.
     #[arg(long, default_value = "1000..1100", value_parser = seeds)]
     seeds: std::ops::Range<u64>,
@@ -43,35 +34,9 @@ pub struct BenchArgs {
     json: Option<PathBuf>,
 }
 
-/// Other benchmarks.
-#[derive(Subcommand)]
-enum Other {
-    /// From a view to another view of the same flat, without a map: the table of the paper "Visual Target Navigation".
-    VisualTarget(visual_target::VisualTargetArgs),
-}
-
-pub fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
-    let parse = || {
-        let (from, to) = text.split_once("..")?;
-        Some(from.trim().parse().ok()?..to.trim().parse().ok()?)
-    };
-    match parse() {
-        Some(range) if range.start < range.end => Ok(range),
-        _ => Err(format!("{text:?} is not a range of seeds such as 1000..1100")),
-    }
-}
-
-pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
-    if let Some(Other::VisualTarget(args)) = args.other {
-        return visual_target::run(args);
-    }
-    // Known before the hours are spent: can the report be written?
+pub fn run(args: NavigationArgs) -> anyhow::Result<Ended> {
     if let Some(path) = &args.json {
-        std::fs::File::options()
-            .create(true)
-            .append(true)
-            .open(path)
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        can_be_written(path)?;
     }
     let policy = match args.policy {
         Policy::Straight => homing_benchmark::Policy::Straight,

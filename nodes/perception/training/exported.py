@@ -1,0 +1,36 @@
+"""The networks as they are exported: inputs and outputs are those of the runtime's contracts."""
+
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+from .extractor import CELL, ExportedExtractor, Extractor, keypoint_score, largest_near
+
+# Contract "r2d2" keeps what reaches 0.7 on both maps. Roots bring scores near one another; 0.002 becomes 0.7.
+SCORE_MIN, LIMIT = 0.002, 0.7
+
+
+class ExportedR2d2(nn.Module):
+    """Red, green and blue, normalised as ImageNet is, to 128-d descriptors, reliability and repeatability (contract "r2d2").
+
+    The descriptors keep their cells of 8 x 8 pixels; both maps have the image's size.
+    """
+
+    def __init__(self, extractor: Extractor):
+        super().__init__()
+        self.extractor = ExportedExtractor(extractor, "wide")
+        luma, mean, deviation = [0.299, 0.587, 0.114], [0.485, 0.456, 0.406], [0.229, 0.224, 0.225]
+        self.register_buffer("weights", 255 * torch.tensor([w * d for w, d in zip(luma, deviation)]).view(1, 3, 1, 1))
+        self.offset = 255 * sum(w * m for w, m in zip(luma, mean))
+
+    def forward(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        grey = (image * self.weights).sum(1, keepdim=True) + self.offset
+        heat, descriptors, reliability = self.extractor(grey)
+        score = keypoint_score(heat, reliability)
+        root = torch.sqrt(torch.sqrt(score))
+        limit = SCORE_MIN**0.25
+        repeatability = root / (root + limit * (1 - LIMIT) / LIMIT)
+        # Contract "r2d2" takes maxima of 3 x 3, these are of 5 x 5.
+        peak = (score >= largest_near(score, 2)).float()
+        large = F.interpolate(reliability, scale_factor=float(CELL), mode="bilinear")
+        return descriptors, LIMIT + (1 - LIMIT) * large, repeatability * peak
