@@ -1,12 +1,13 @@
 //! `homing bench visual-target`: the table of the paper "Visual Target Navigation", by one command.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Context;
 use clap::Args;
-use homing_benchmark::visual_target::bench::PairRuns;
 use homing_benchmark::visual_target::{
-    Difficulty, Options, PairRun, PairSpec, Pipeline, Report, Solver, TargetPair, bench, contact_sheet,
+    Difficulty, Options, PairRun, PairRuns, PairSpec, Pipeline, Progress, Report, Solver, TargetPair, bench,
+    contact_sheet,
 };
 use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
 use homing_sim::Viewpoint;
@@ -63,10 +64,21 @@ pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
     let camera = Viewpoint { hfov_rad: args.hfov_deg.to_radians(), ..Viewpoint::default() };
     let pairs = PairSpec { n_each: usize::from(args.pairs), seed: args.seed, camera, overlap_min: args.overlap_min };
     let options = Options { pairs, pipelines: pipelines(&args.models), threads: args.threads };
-    let bar = ProgressBar::new(3 * u64::from(args.pairs)).with_style(style());
-    let report = bench(&options, &|(pair, runs): &PairRuns| {
-        bar.inc(1);
-        bar.set_message(format!("{}: {} of {} reached", pair.difficulty.name(), n_won(runs), runs.len()));
+    let bar = ProgressBar::new(3 * u64::from(args.pairs)).with_style(style()).with_message("drawing pairs");
+    let n_drawn = AtomicU64::new(0);
+    let report = bench(&options, &|progress| match progress {
+        Progress::Drawn(_) => {
+            bar.inc(1);
+            if n_drawn.fetch_add(1, Ordering::Relaxed) + 1 == 3 * u64::from(args.pairs) {
+                bar.reset();
+                bar.set_message("looking");
+            }
+        }
+        Progress::Ran(runs) => {
+            bar.inc(1);
+            // The minutes are not lost with the table: every pair is said as it ends.
+            bar.suspend(|| println!("{}", line(&options.pipelines, runs)));
+        }
     })?;
     bar.finish_and_clear();
     println!("{report}");
@@ -74,8 +86,23 @@ pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
     Ok(Ended::Well)
 }
 
-fn n_won(runs: &[PairRun]) -> usize {
-    runs.iter().filter(|run| run.success).count()
+/// One pair: what it is, and what came of it by pipeline: one step, multi-step, colour alone.
+fn line(pipelines: &[Pipeline], (pair, runs): &PairRuns) -> String {
+    let n_ways = runs.len() / pipelines.len().max(1);
+    let mark = |run: &PairRun| if run.success { '+' } else { '-' };
+    let of = |pipeline: &Pipeline, runs: &[PairRun]| {
+        format!("  {} {}", pipeline.name, runs.iter().map(mark).collect::<String>())
+    };
+    let each = pipelines.iter().zip(runs.chunks(n_ways.max(1)));
+    format!(
+        "{:8} flat {} {:5.2} m {:4.0} deg, overlap {:3.0} %:{}",
+        pair.difficulty.name(),
+        pair.flat,
+        pair.distance_m(),
+        pair.heading_deg(),
+        100.0 * pair.overlap,
+        each.map(|(pipeline, runs)| of(pipeline, runs)).collect::<String>()
+    )
 }
 
 /// Features of a row, by what they are called in the manifest.

@@ -10,7 +10,7 @@ pub mod report;
 pub mod run;
 mod sheet;
 
-pub use bench::{Options, bench};
+pub use bench::{Options, PairRuns, Progress, bench};
 pub use methods::{Pipeline, Solver};
 pub use pairs::{Difficulty, PairSpec, TargetPair};
 pub use report::Report;
