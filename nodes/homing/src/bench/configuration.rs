@@ -79,7 +79,8 @@ fn turn(setup: &mut Setup, key: &str, value: &str) -> anyhow::Result<()> {
         }
         "ratio" => setup.perception.ratio_max = value.parse()?,
         "confidence" => setup.features.matcher_config.confidence_min = value.parse()?,
-        _ => bail!("{key:?} is none of solver, keypoints, ratio, confidence; a label comes last"),
+        "patches" => setup.perception.gates.patch_share_min = value.parse()?,
+        _ => bail!("{key:?} is none of solver, keypoints, ratio, confidence, patches; a label comes last"),
     }
     Ok(())
 }
