@@ -215,3 +215,101 @@ impl Refinement {
         Decision::Done(if self.seen { Ending::Lost } else { Ending::NotSeen })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::FRAC_PI_2;
+
+    use homing_core::{Goal, UnseenReason};
+    use nalgebra::{Matrix3, Matrix6, Vector3};
+
+    use super::*;
+
+    const TARGET: PlanarPose = PlanarPose { x_m: 3.0, y_m: -1.0, yaw_rad: 0.7 };
+
+    /// A level camera 1.25 m above the floor, a little ahead of the body's middle.
+    fn mount() -> Transform<Base, Camera> {
+        let r = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        Transform::from_rotation(&r, Vector3::new(0.1, 0.0, 1.25))
+    }
+
+    /// What a perception would say from `at` that sees the target with this much too much distance.
+    fn pose_from(at: PlanarPose, scale: f64) -> Sighting {
+        let t_odom_base: Transform<Odom, Base> = at.to_transform();
+        let t_odom_target: Transform<Odom, Base> = TARGET.to_transform();
+        let chain = (t_odom_base * mount()).inverse().isometry() * (t_odom_target * mount()).isometry();
+        let mut isometry = chain;
+        isometry.translation.vector *= scale;
+        let t_camera_goal: Transform<Camera, Goal> = Transform::new(isometry);
+        Sighting::Pose { t_camera_goal, covariance: Matrix6::identity(), n_inliers: 50, rms_rad: 0.001 }
+    }
+
+    fn bearing_from(at: PlanarPose, sd_rad: f64) -> Sighting {
+        Sighting::Bearing {
+            bearing_rad: at.bearing_to(TARGET.x_m, TARGET.y_m),
+            bearing_sd_rad: sd_rad,
+            heading_rad: wrap_angle(TARGET.yaw_rad - at.yaw_rad),
+            n_inliers: 50,
+        }
+    }
+
+    /// Goes wherever it is told to; gives the place at the end, why it ended, and the motions made.
+    fn follow(approach: Approach, see: impl Fn(PlanarPose, u32) -> Sighting) -> (PlanarPose, Ending, u32) {
+        let (mut refinement, mut at) = (Refinement::new(approach), PlanarPose { x_m: 0.5, y_m: 1.0, yaw_rad: -0.3 });
+        for _ in 0..100 {
+            let sighting = see(at, refinement.n_moves());
+            let look = Look { t_odom_base: at.to_transform(), t_base_camera: mount(), sighting: &sighting };
+            match refinement.next(&look) {
+                Decision::Move(to) => at = to,
+                Decision::Done(ending) => return (at, ending, refinement.n_moves()),
+            }
+        }
+        unreachable!("an approach ends");
+    }
+
+    fn off_m(at: PlanarPose) -> f64 {
+        at.distance_to(TARGET.x_m, TARGET.y_m)
+    }
+
+    #[test]
+    fn one_step_leads_to_the_estimated_pose_and_no_farther() {
+        let (at, ending, n_moves) = follow(Approach::OneStep, |at, _| pose_from(at, 1.0));
+        assert!(off_m(at) < 1e-9 && wrap_angle(at.yaw_rad - TARGET.yaw_rad).abs() < 1e-9, "{at:?}");
+        assert_eq!((ending, n_moves), (Ending::Spent, 1));
+    }
+
+    #[test]
+    fn more_steps_correct_what_the_first_was_off_by() {
+        let see = |at, _| pose_from(at, 1.3);
+        let (once, ..) = follow(Approach::OneStep, see);
+        let (often, ending, n_moves) = follow(Approach::MultiStep(MultiStep::default()), see);
+        assert!(off_m(once) > 0.5 && off_m(often) < 0.02, "{} {}", off_m(once), off_m(often));
+        assert_eq!(ending, Ending::Settled);
+        assert!((2..=5).contains(&n_moves));
+    }
+
+    #[test]
+    fn unit_steps_close_in_on_a_target_whose_distance_is_not_known() {
+        let see = |at: PlanarPose, _| bearing_from(at, 0.01);
+        let (at, ending, _) = follow(Approach::UnitStep(UnitStep::default()), see);
+        assert!(off_m(at) < 0.2 && wrap_angle(at.yaw_rad - TARGET.yaw_rad).abs() < 1e-9, "{at:?}");
+        assert_eq!(ending, Ending::Settled);
+        // Perception's own poses serve as directions.
+        let (at, ..) = follow(Approach::UnitStep(UnitStep::default()), |at, _| pose_from(at, 2.0));
+        assert!(off_m(at) < 0.2, "{at:?}");
+    }
+
+    #[test]
+    fn what_is_not_seen_is_not_followed() {
+        let unseen = Sighting::NotSeen { reason: UnseenReason::NoConsensus };
+        let unit = Approach::UnitStep(UnitStep::default());
+        for approach in [Approach::OneStep, Approach::MultiStep(MultiStep::default()), unit] {
+            let (at, ending, n_moves) = follow(approach, |_, _| unseen.clone());
+            assert_eq!((at.x_m, ending, n_moves), (0.5, Ending::NotSeen, 0));
+        }
+        let vanishes = |at, n| if n == 0 { pose_from(at, 1.0) } else { unseen.clone() };
+        assert_eq!(follow(Approach::MultiStep(MultiStep::default()), vanishes).1, Ending::Lost);
+        let nearly_there = |at, n| bearing_from(at, if n == 0 { 0.1 } else { FRAC_PI_2 });
+        assert_eq!(follow(unit, nearly_there).1, Ending::NoParallax);
+    }
+}

@@ -6,13 +6,14 @@ use anyhow::Context;
 use clap::Args;
 use homing_benchmark::visual_target::bench::PairRuns;
 use homing_benchmark::visual_target::{
-    Difficulty, Method, Options, PairRun, PairSpec, Report, Solver, TargetPair, bench, contact_sheet, rows,
+    Difficulty, Options, PairRun, PairSpec, Pipeline, Report, Solver, TargetPair, bench, contact_sheet,
 };
 use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
 use homing_sim::Viewpoint;
 use homing_sim::views::OVERLAP_MIN;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::can_be_written;
 use crate::Ended;
 use crate::photo::{field_of_view, png};
 
@@ -53,15 +54,15 @@ pub struct VisualTargetArgs {
 
 pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
     // Known before the minutes are spent: can the report be written?
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot write {}", folder.display()))?;
+    }
     for path in args.json.iter().cloned().chain(args.out.iter().map(|folder| folder.join("report.json"))) {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let said = || format!("cannot write {}", path.display());
-        std::fs::create_dir_all(folder).with_context(said)?;
-        std::fs::File::options().create(true).append(true).open(&path).with_context(said)?;
+        can_be_written(&path)?;
     }
     let camera = Viewpoint { hfov_rad: args.hfov_deg.to_radians(), ..Viewpoint::default() };
     let pairs = PairSpec { n_each: usize::from(args.pairs), seed: args.seed, camera, overlap_min: args.overlap_min };
-    let options = Options { pairs, methods: methods(&args.models), threads: args.threads };
+    let options = Options { pairs, pipelines: pipelines(&args.models), threads: args.threads };
     let bar = ProgressBar::new(3 * u64::from(args.pairs)).with_style(style());
     let report = bench(&options, &|(pair, runs): &PairRuns| {
         bar.inc(1);
@@ -80,20 +81,20 @@ fn n_won(runs: &[PairRun]) -> usize {
 /// Features of a row, by what they are called in the manifest.
 const FEATURES: [(&str, &str, &str, Solver); 3] = [
     ("R2D2-like, EPnP", "homing-r2d2", "mutual-nearest", Solver::Papers),
-    ("ours", "homing-extractor", "homing-matcher", Solver::Ours),
+    ("ours", "homing-extractor", "homing-matcher-accurate", Solver::Ours),
     ("SIFT", "sift", "mutual-nearest", Solver::Ours),
 ];
 
 /// All rows; those whose model is missing are left out with a word.
-fn methods(models: &Path) -> Vec<Method> {
-    let mut methods = Vec::new();
+fn pipelines(models: &Path) -> Vec<Pipeline> {
+    let mut pipelines = Vec::new();
     for (name, extractor, matcher, solver) in FEATURES {
         match features(extractor, matcher, models) {
-            Ok(features) => methods.extend(rows(name, &features, solver)),
+            Ok(features) => pipelines.push(Pipeline { name: name.to_owned(), features, solver }),
             Err(cause) => eprintln!("the rows \"{name}\" are left out: {cause:#}"),
         }
     }
-    methods
+    pipelines
 }
 
 fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {

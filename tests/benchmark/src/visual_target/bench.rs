@@ -1,47 +1,32 @@
-//! All methods on all pairs.
+//! All pipelines, in all ways, on all pairs.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use homing_perception::onnx::FeatureChoice;
-use homing_perception::{AnyEstimator, PerceptionConfig};
-use homing_planner::visual_target::Approach;
+use homing_core::GoalPhoto;
+use homing_perception::{AnyEstimator, PerceptionError};
 
-use super::pairs::{PairSpec, TargetPair, Wanted, draw_pair, plan};
+use super::methods::{Pipeline, ways};
+use super::pairs::{PairSpec, TargetPair, Wanted, draw_pair, plan, view};
 use super::report::Report;
-use super::run::{PairRun, Sensor, run_pair};
+use super::run::{PairRun, Robot};
 use crate::RunError;
-
-/// A row of the table: one configuration of perception, and how its sightings become motions.
-#[derive(Clone, Debug)]
-pub struct Method {
-    /// For tables.
-    pub name: String,
-    /// What finds keypoints, and what pairs them.
-    pub features: FeatureChoice,
-    /// Perception's settings. OpenCV gets one thread per worker, whatever they say.
-    pub perception: PerceptionConfig,
-    /// What the robot's camera delivers.
-    pub sensor: Sensor,
-    /// How sightings become motions.
-    pub approach: Approach,
-}
 
 /// What to run.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The pairs.
     pub pairs: PairSpec,
-    /// The rows.
-    pub methods: Vec<Method>,
+    /// Configurations of perception; each is run in all [`ways`].
+    pub pipelines: Vec<Pipeline>,
     /// Pairs at a time; 0 for one per core.
     pub threads: usize,
 }
 
-/// A pair with what each method made of it.
+/// A pair with what came of it, by pipeline, then by way.
 pub type PairRuns = (TargetPair, Vec<PairRun>);
 
-/// Runs every method on every pair. `progress` hears of each pair as it ends, in any order; the report lists them as they
+/// Runs every pipeline in every way on every pair. `progress` hears of each pair as it ends, in any order; the report lists them as they
 /// were planned, and is the same whatever the number of threads.
 ///
 /// # Errors
@@ -57,11 +42,12 @@ pub fn bench(options: &Options, progress: &(dyn Fn(&PairRuns) + Sync)) -> Result
     let worker = || -> Result<(), RunError> {
         // A pool of its own keeps the renderer's work on this thread.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-        let mut estimators = open(&options.methods)?;
+        let mut estimators =
+            options.pipelines.iter().map(Pipeline::open).collect::<Result<Vec<AnyEstimator>, PerceptionError>>()?;
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(wanted_here) = wanted.get(index) else { return Ok(()) };
-            let result = pool.install(|| run_methods(wanted_here, wanted.len() as u64, options, &mut estimators));
+            let result = pool.install(|| run_pair(wanted_here, wanted.len() as u64, options, &mut estimators));
             if let Ok(runs) = &result {
                 progress(runs);
             }
@@ -78,23 +64,21 @@ pub fn bench(options: &Options, progress: &(dyn Fn(&PairRuns) + Sync)) -> Result
     Ok(Report::new(options, runs))
 }
 
-fn open(methods: &[Method]) -> Result<Vec<AnyEstimator>, RunError> {
-    let one_thread = |m: &Method| PerceptionConfig { threads: Some(1), ..m.perception };
-    methods.iter().map(|m| Ok(AnyEstimator::open(one_thread(m), &m.features)?)).collect()
-}
-
-fn run_methods(
+fn run_pair(
     wanted: &Wanted,
     n_pairs: u64,
     options: &Options,
     estimators: &mut [AnyEstimator],
 ) -> Result<PairRuns, RunError> {
     let (arena, pair) = draw_pair(wanted, n_pairs, &options.pairs)?;
-    let camera = &options.pairs.camera;
-    let runs = options
-        .methods
-        .iter()
-        .zip(estimators)
-        .map(|(method, estimator)| run_pair(&arena, &pair, camera, method.sensor, method.approach, estimator));
-    Ok((pair, runs.collect::<Result<_, _>>()?))
+    let photo = view(&arena, &options.pairs.camera, pair.target)?;
+    let mut runs = Vec::new();
+    for estimator in estimators {
+        estimator.set_goal(GoalPhoto { id: 1, rgb: Arc::new(photo.rgb.clone()), intrinsics: photo.camera })?;
+        let mut robot = Robot::new(&arena, options.pairs.camera, estimator);
+        for way in ways() {
+            runs.push(robot.run(&pair, &way)?);
+        }
+    }
+    Ok((pair, runs))
 }

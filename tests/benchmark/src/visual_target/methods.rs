@@ -1,10 +1,9 @@
-//! The rows of the table: the paper's three procedures with any features and either pose solver.
+//! The rows of the table: the paper's three procedures, each with any features and either pose solver.
 
 use homing_perception::onnx::FeatureChoice;
-use homing_perception::{PerceptionConfig, PoseSolver};
+use homing_perception::{AnyEstimator, PerceptionConfig, PerceptionError, PoseSolver};
 use homing_planner::visual_target::{Approach, MultiStep, UnitStep};
 
-use super::bench::Method;
 use super::run::Sensor;
 
 /// What makes a pose of matches.
@@ -31,19 +30,43 @@ impl Solver {
     }
 }
 
+/// A row of the table for each pipeline: what the camera delivers, and how sightings become motions.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct Way {
+    /// For tables.
+    pub name: &'static str,
+    /// What the camera delivers.
+    pub sensor: Sensor,
+    /// How sightings become motions.
+    pub approach: Approach,
+}
+
 /// One step (paper, 2.3 and 3.2), multi-step, and colour alone in unit steps.
 #[must_use]
-pub fn rows(name: &str, features: &FeatureChoice, solver: Solver) -> [Method; 3] {
-    let row = |how: &str, sensor, approach| Method {
-        name: format!("{name}, {how}"),
-        features: features.clone(),
-        perception: solver.perception(),
-        sensor,
-        approach,
-    };
+pub fn ways() -> [Way; 3] {
     [
-        row("one step", Sensor::RgbD, Approach::OneStep),
-        row("multi-step", Sensor::RgbD, Approach::MultiStep(MultiStep::default())),
-        row("RGB, unit steps", Sensor::Rgb, Approach::UnitStep(UnitStep::default())),
+        Way { name: "one step", sensor: Sensor::RgbD, approach: Approach::OneStep },
+        Way { name: "multi-step", sensor: Sensor::RgbD, approach: Approach::MultiStep(MultiStep::default()) },
+        Way { name: "RGB, unit steps", sensor: Sensor::Rgb, approach: Approach::UnitStep(UnitStep::default()) },
     ]
+}
+
+/// One configuration of perception.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    /// For tables.
+    pub name: String,
+    /// What finds keypoints, and what pairs them.
+    pub features: FeatureChoice,
+    /// What makes a pose of matches.
+    pub solver: Solver,
+}
+
+impl Pipeline {
+    /// # Errors
+    /// As [`AnyEstimator::open`].
+    pub fn open(&self) -> Result<AnyEstimator, PerceptionError> {
+        // OpenCV gets one thread per worker.
+        AnyEstimator::open(PerceptionConfig { threads: Some(1), ..self.solver.perception() }, &self.features)
+    }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use homing_core::wrap_angle;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{FloorPose, Viewpoint, t_world_base};
+use homing_sim::flat::Detail;
 use homing_sim::laser::LaserSlice;
 use homing_sim::views::{View, seen_share};
 use rand::{RngExt, SeedableRng};
@@ -131,16 +132,16 @@ const DISTANCE_SPREAD: f64 = 0.25;
 /// Differences of headings likewise.
 const HEADING_SPREAD: f64 = 0.5;
 /// Places tried in one flat.
-const PLACES_MAX: u32 = 4000;
+const PLACES_MAX: u32 = 20_000;
 /// Pairs of pictures taken in one flat.
-const PICTURES_MAX: u32 = 150;
+const PICTURES_MAX: u32 = 60;
 /// Flats tried for one pair.
-const FLATS_MAX: u64 = 40;
+const FLATS_MAX: u64 = 60;
 /// Columns of the pictures with which overlaps are tried.
-const TRIAL_WIDTH: u32 = 160;
+const TRIAL_WIDTH: u32 = 96;
 
 /// Rays of a horizon.
-const RAYS: u32 = 96;
+const RAYS: u32 = 64;
 /// Nothing is farther than this, metres.
 const HORIZON_M: f64 = 60.0;
 /// Two points nearer than this on one line of sight are one, metres.
@@ -193,93 +194,112 @@ pub fn plan(spec: &PairSpec) -> Vec<Wanted> {
 /// # Errors
 /// [`RunError::NoPair`] if no flat offers one, [`RunError::Camera`] for a camera that cannot be.
 pub fn draw_pair(wanted: &Wanted, n_pairs: u64, spec: &PairSpec) -> Result<(Arc<Arena>, TargetPair), RunError> {
-    spec.camera.intrinsics()?;
     for attempt in 0..FLATS_MAX {
         let flat = spec.seed + wanted.index + attempt * n_pairs;
-        let arena = Arena::load(&SceneRef::Flat { seed: flat }, BodySize::default())?;
-        let rng = &mut ChaCha8Rng::seed_from_u64(flat ^ 0x7669_7375_616c_7461);
-        if let Some(pair) = pair_in(&arena, flat, wanted, spec, rng)? {
+        // Shapes tell what views share; the flat is painted once it offers a pair.
+        if let Some(pair) = Search::new(flat, spec)?.pair(wanted)? {
+            let arena = Arena::load(&SceneRef::Flat { seed: flat }, BodySize::default())?;
             return Ok((Arc::new(arena), pair));
         }
     }
-    Err(RunError::NoPair {
-        distance_m: wanted.distance_m,
-        heading_deg: wanted.heading_rad.to_degrees(),
-        flats: FLATS_MAX,
-    })
+    let (distance_m, heading_deg) = (wanted.distance_m, wanted.heading_rad.to_degrees());
+    Err(RunError::NoPair { distance_m, heading_deg, flats: FLATS_MAX })
 }
 
-fn pair_in(
-    arena: &Arena,
+/// The search for a pair in one flat.
+struct Search<'a> {
+    spec: &'a PairSpec,
     flat: u64,
-    wanted: &Wanted,
-    spec: &PairSpec,
-    rng: &mut ChaCha8Rng,
-) -> Result<Option<TargetPair>, RunError> {
-    let trial =
-        Viewpoint { width: TRIAL_WIDTH, height: TRIAL_WIDTH * spec.camera.height / spec.camera.width, ..spec.camera };
-    let horizon = LaserSlice::new(arena.scene(), arena.grid().floor_z_m() + spec.camera.height_m);
-    let mut n_pictures = 0;
-    for _ in 0..PLACES_MAX {
-        let Some((start, target)) = free_places(arena, wanted, rng) else { continue };
-        if !share_horizon(&horizon, spec.camera.hfov_rad, start, target) {
-            continue;
-        }
-        n_pictures += 1;
-        if n_pictures > PICTURES_MAX {
-            break;
-        }
-        // Few pixels tell roughly; all of them decide.
-        let (a, b) = (view(arena, &trial, start)?, view(arena, &trial, target)?);
-        if seen_share(&a, &b).min(seen_share(&b, &a)) < 0.5 * spec.overlap_min {
-            continue;
-        }
-        let (a, b) = (view(arena, &spec.camera, start)?, view(arena, &spec.camera, target)?);
-        let (start_seen, target_seen) = (seen_share(&a, &b), seen_share(&b, &a));
-        let overlap = start_seen.min(target_seen);
-        if overlap >= spec.overlap_min {
-            return Ok(Some(TargetPair {
-                difficulty: wanted.difficulty,
-                flat,
-                start,
-                target,
-                overlap,
-                target_seen,
-                start_seen,
-            }));
-        }
+    arena: Arena,
+    horizon: LaserSlice,
+    /// Where a robot can stand, metres.
+    places: Vec<(f64, f64)>,
+    rng: ChaCha8Rng,
+}
+
+impl<'a> Search<'a> {
+    fn new(flat: u64, spec: &'a PairSpec) -> Result<Self, RunError> {
+        let arena = Arena::load_as(&SceneRef::Flat { seed: flat }, BodySize::default(), Detail::Shape)?;
+        let horizon = LaserSlice::new(arena.scene(), arena.grid().floor_z_m() + spec.camera.height_m);
+        let (space, g) = (arena.space(), arena.space().geometry());
+        let free = (0..g.len()).filter(|i| space.cells()[*i]);
+        let places = free.map(|i| g.centre(i % g.width, i / g.width)).collect();
+        let rng = ChaCha8Rng::seed_from_u64(flat ^ 0x7669_7375_616c_7461);
+        Ok(Self { spec, flat, arena, horizon, places, rng })
     }
-    Ok(None)
+
+    fn pair(&mut self, wanted: &Wanted) -> Result<Option<TargetPair>, RunError> {
+        let camera = self.spec.camera;
+        let trial = Viewpoint { width: TRIAL_WIDTH, height: TRIAL_WIDTH * camera.height / camera.width, ..camera };
+        let overlap_min = self.spec.overlap_min;
+        let mut n_pictures = 0;
+        for _ in 0..PLACES_MAX {
+            let Some((start, target)) = self.free_places(wanted) else { continue };
+            // Rays, then few pixels, tell roughly; all pixels decide.
+            if horizon_overlap(&self.horizon, camera.hfov_rad, start, target) < 0.5 * overlap_min {
+                continue;
+            }
+            n_pictures += 1;
+            if n_pictures > PICTURES_MAX {
+                break;
+            }
+            let (rough, _) = self.shares(&trial, start, target)?;
+            if rough < 0.5 * overlap_min {
+                continue;
+            }
+            let (overlap, (start_seen, target_seen)) = self.shares(&camera, start, target)?;
+            if overlap >= overlap_min {
+                let (difficulty, flat) = (wanted.difficulty, self.flat);
+                return Ok(Some(TargetPair { difficulty, flat, start, target, overlap, target_seen, start_seen }));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Start and target at the wanted distance and headings, if both stand free.
+    fn free_places(&mut self, wanted: &Wanted) -> Option<(FloorPose, FloorPose)> {
+        let (x_m, y_m) = self.places[self.rng.random_range(0..self.places.len() as u64) as usize];
+        let yaw_rad = self.rng.random_range(-PI..PI);
+        let direction_rad = self.rng.random_range(-PI..PI);
+        let target = FloorPose {
+            x_m: x_m + wanted.distance_m * libm::cos(direction_rad),
+            y_m: y_m + wanted.distance_m * libm::sin(direction_rad),
+            yaw_rad: wrap_angle(yaw_rad + wanted.heading_rad),
+        };
+        self.arena.space().contains(target.x_m, target.y_m).then_some((FloorPose { x_m, y_m, yaw_rad }, target))
+    }
+
+    /// The smaller of the two shares, and the shares: of the start view that the target view sees, and of the target view.
+    fn shares(&self, camera: &Viewpoint, start: FloorPose, target: FloorPose) -> Result<(f64, (f64, f64)), RunError> {
+        let (a, b) = (view(&self.arena, camera, start)?, view(&self.arena, camera, target)?);
+        let shares = (seen_share(&a, &b), seen_share(&b, &a));
+        Ok((shares.0.min(shares.1), shares))
+    }
 }
 
-/// Start and target at the wanted distance and headings, if both stand free.
-fn free_places(arena: &Arena, wanted: &Wanted, rng: &mut ChaCha8Rng) -> Option<(FloorPose, FloorPose)> {
-    let (x_m, y_m) = arena.space().nth(rng.random_range(0..arena.space().len() as u64) as usize)?;
-    let yaw_rad = rng.random_range(-PI..PI);
-    let direction_rad = rng.random_range(-PI..PI);
-    let target = FloorPose {
-        x_m: x_m + wanted.distance_m * libm::cos(direction_rad),
-        y_m: y_m + wanted.distance_m * libm::sin(direction_rad),
-        yaw_rad: wrap_angle(yaw_rad + wanted.heading_rad),
-    };
-    arena.space().contains(target.x_m, target.y_m).then_some((FloorPose { x_m, y_m, yaw_rad }, target))
+/// The smaller of the two shares of the horizon that each of two views sees of the other's. Rays are faster than pictures,
+/// and what lies above and below the horizon shares less where the views are far apart.
+fn horizon_overlap(horizon: &LaserSlice, hfov_rad: f64, a: FloorPose, b: FloorPose) -> f64 {
+    seen_of_horizon(horizon, hfov_rad, a, b).min(seen_of_horizon(horizon, hfov_rad, b, a))
 }
 
-/// False if nothing at the height of the cameras is seen by both: such views share next to nothing, and rays are faster
-/// than pictures.
-fn share_horizon(horizon: &LaserSlice, hfov_rad: f64, start: FloorPose, target: FloorPose) -> bool {
-    let seen = |k: u32| {
-        let direction_rad = target.yaw_rad + hfov_rad * (f64::from(k) / f64::from(RAYS - 1) - 0.5);
-        let range_m = horizon.range_m((target.x_m, target.y_m), direction_rad, HORIZON_M)?;
-        let (x_m, y_m) =
-            (target.x_m + range_m * libm::cos(direction_rad), target.y_m + range_m * libm::sin(direction_rad));
-        let (dx, dy) = (x_m - start.x_m, y_m - start.y_m);
+/// Share of what lies on the horizon of `from` that `to` sees.
+fn seen_of_horizon(horizon: &LaserSlice, hfov_rad: f64, from: FloorPose, to: FloorPose) -> f64 {
+    let half_width = libm::tan(0.5 * hfov_rad);
+    let is_seen = |k: &u32| {
+        // Evenly over the columns of the picture.
+        let across = libm::atan(half_width * (2.0 * (f64::from(*k) + 0.5) / f64::from(RAYS) - 1.0));
+        let direction_rad = from.yaw_rad + across;
+        let Some(range_m) = horizon.range_m((from.x_m, from.y_m), direction_rad, HORIZON_M) else { return false };
+        let x_m = from.x_m + range_m * libm::cos(direction_rad);
+        let y_m = from.y_m + range_m * libm::sin(direction_rad);
+        let (dx, dy) = (x_m - to.x_m, y_m - to.y_m);
         let bearing_rad = libm::atan2(dy, dx);
-        let inside = wrap_angle(bearing_rad - start.yaw_rad).abs() <= 0.5 * hfov_rad;
-        let way_m = libm::hypot(dx, dy) - SLACK_M;
-        Some(inside && horizon.range_m((start.x_m, start.y_m), bearing_rad, way_m.max(0.0)).is_none())
+        let way_m = (libm::hypot(dx, dy) - SLACK_M).max(0.0);
+        wrap_angle(bearing_rad - to.yaw_rad).abs() <= 0.5 * hfov_rad
+            && horizon.range_m((to.x_m, to.y_m), bearing_rad, way_m).is_none()
     };
-    (0..RAYS).any(|k| seen(k) == Some(true))
+    (0..RAYS).filter(is_seen).count() as f64 / f64::from(RAYS)
 }
 
 /// What the camera sees from a place.
@@ -291,4 +311,42 @@ pub fn view(arena: &Arena, camera: &Viewpoint, at: FloorPose) -> Result<View, Ru
     let intrinsics = camera.intrinsics()?;
     let (rgb, depth) = arena.view(&intrinsics, &t_world_camera);
     Ok(View { camera: intrinsics, t_world_camera, rgb, depth, variant: 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spec(n_each: usize) -> PairSpec {
+        PairSpec { n_each, seed: 300_000, camera: Viewpoint::default(), overlap_min: 0.1 }
+    }
+
+    #[test]
+    fn the_plan_has_the_papers_means() {
+        for n in [1, 4, 20] {
+            let all = plan(&spec(n));
+            assert_eq!(all.len(), 3 * n);
+            for difficulty in Difficulty::ALL {
+                let of: Vec<&Wanted> = all.iter().filter(|w| w.difficulty == difficulty).collect();
+                let mean = |value: fn(&Wanted) -> f64| of.iter().map(|w| value(w)).sum::<f64>() / of.len() as f64;
+                let published = difficulty.published();
+                assert!((mean(|w| w.distance_m) - published.distance_m).abs() < 1e-9);
+                assert!((mean(|w| w.heading_rad.abs().to_degrees()) - published.heading_deg).abs() < 1e-9);
+            }
+        }
+        assert_eq!(plan(&spec(20)), plan(&spec(20)));
+    }
+
+    #[test]
+    fn pairs_are_what_was_asked_for_and_the_same_each_time() -> Result<(), RunError> {
+        let spec = PairSpec { camera: Viewpoint { width: 160, height: 120, ..Viewpoint::default() }, ..spec(1) };
+        let wanted = plan(&spec)[0];
+        let (arena, pair) = draw_pair(&wanted, 3, &spec)?;
+        assert!((pair.distance_m() - wanted.distance_m).abs() < 1e-9);
+        assert!((pair.heading_deg() - wanted.heading_rad.abs().to_degrees()).abs() < 1e-9);
+        assert!(pair.overlap >= spec.overlap_min && pair.overlap == pair.start_seen.min(pair.target_seen));
+        assert!([pair.start, pair.target].iter().all(|p| arena.space().contains(p.x_m, p.y_m)));
+        assert_eq!(draw_pair(&wanted, 3, &spec)?.1, pair);
+        Ok(())
+    }
 }

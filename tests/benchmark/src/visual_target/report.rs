@@ -7,6 +7,7 @@ use homing_planner::visual_target::{MultiStep, UnitStep};
 use serde::{Deserialize, Serialize};
 
 use super::bench::{Options, PairRuns};
+use super::methods::ways;
 use super::pairs::{Difficulty, Published, TargetPair};
 use super::run::{Finding, PairRun, Sensor};
 use crate::report::wilson_95;
@@ -143,13 +144,14 @@ impl Report {
     pub fn new(options: &Options, runs: Vec<PairRuns>) -> Self {
         let camera = &options.pairs.camera;
         let pairs: Vec<TargetPair> = runs.iter().map(|(pair, _)| *pair).collect();
-        let methods = options.methods.iter().enumerate().map(|(k, method)| {
+        let rows = options.pipelines.iter().flat_map(|pipeline| ways().map(|way| (pipeline, way)));
+        let methods = rows.enumerate().map(|(k, (pipeline, way))| {
             let of_method: Vec<(&TargetPair, &PairRun)> = runs.iter().map(|(pair, runs)| (pair, &runs[k])).collect();
             MethodReport {
-                name: method.name.clone(),
-                features: format!("{} + {}", method.features.extractor.name(), method.features.matcher.name()),
-                solver: format!("{:?}", method.perception.solver),
-                sensor: method.sensor,
+                name: format!("{}, {}", pipeline.name, way.name),
+                features: format!("{} + {}", pipeline.features.extractor.name(), pipeline.features.matcher.name()),
+                solver: format!("{:?}", pipeline.solver),
+                sensor: way.sensor,
                 cells: Difficulty::ALL.map(|d| Cell::of(d, &of_method)).to_vec(),
                 runs: of_method.iter().map(|(_, run)| (*run).clone()).collect(),
             }
@@ -305,5 +307,59 @@ impl Report {
             unit.step_m,
             unit.step_m_min
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use homing_sim::episode::{FloorPose, Viewpoint};
+
+    use super::super::methods::{Pipeline, Solver};
+    use super::super::pairs::PairSpec;
+    use super::*;
+
+    fn pair(difficulty: Difficulty, distance_m: f64) -> TargetPair {
+        let start = FloorPose { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0 };
+        let target = FloorPose { x_m: distance_m, y_m: 0.0, yaw_rad: 0.5 };
+        TargetPair { difficulty, flat: 1, start, target, overlap: 0.2, target_seen: 0.4, start_seen: 0.2 }
+    }
+
+    fn run(final_distance_m: f64, finding: Finding, error_m: Option<f64>) -> PairRun {
+        let look = super::super::run::LookRecord {
+            finding,
+            n_matches: 9,
+            n_inliers: 8,
+            distance_m: 2.0,
+            heading_deg: 30.0,
+            error_m,
+            error_deg: error_m.map(|_| 1.0),
+        };
+        let end = FloorPose { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0 };
+        let success = final_distance_m < 0.5;
+        PairRun { success, final_distance_m, final_heading_deg: 1.0, ending: String::new(), end, looks: vec![look] }
+    }
+
+    #[test]
+    fn failures_count_with_their_initial_errors_and_their_cause() {
+        let pairs = PairSpec { n_each: 2, seed: 1, camera: Viewpoint::default(), overlap_min: 0.1 };
+        let pipeline = Pipeline { name: "SIFT".to_owned(), features: Default::default(), solver: Solver::Ours };
+        let options = Options { pairs, pipelines: vec![pipeline], threads: 1 };
+        let good = run(0.1, Finding::Pose, Some(0.1));
+        let wrong = run(3.0, Finding::Pose, Some(4.0));
+        let blind = run(2.0, Finding::NoConsensus, None);
+        let rows = vec![
+            (pair(Difficulty::Moderate, 2.0), vec![good.clone(), good.clone(), wrong]),
+            (pair(Difficulty::Moderate, 3.0), vec![blind, good, run(3.0, Finding::TooFewMatches, None)]),
+        ];
+        let report = Report::new(&options, rows);
+        assert!((report.columns[0].distance_m - 2.5).abs() < 1e-12);
+        let cell = |k: usize| &report.methods[k].cells[0];
+        assert_eq!(cell(0).success_rate, 0.5);
+        assert!((cell(0).final_distance_m - 1.55).abs() < 1e-12, "0.1 of the success, 3 of the failure");
+        assert_eq!(cell(0).losses, BTreeMap::from([(Loss::NoConsensus, 1)]));
+        assert_eq!(cell(1).success_rate, 1.0);
+        assert_eq!(cell(2).losses, BTreeMap::from([(Loss::WrongPlace, 1), (Loss::TooFewMatches, 1)]));
+        let table = report.to_string();
+        assert!(table.contains("2.50 (paper 2.23)") && table.contains("SIFT, multi-step"), "{table}");
     }
 }

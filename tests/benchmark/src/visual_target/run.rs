@@ -1,17 +1,18 @@
-//! One method on one pair: look, move, look again, until the method says that it is there.
+//! One way to one target: look, move, look again, until there is nothing more to do.
 
 use std::sync::Arc;
 
 use homing_core::{
-    Base, DepthImage, GoalPhoto, Odom, PlanarPose, RgbImage, RgbdFrame, Sighting, Stamp, Transform, UnseenReason,
+    Base, DepthImage, GoalEstimate, Odom, PlanarPose, RgbImage, RgbdFrame, Sighting, Stamp, Transform, UnseenReason,
     wrap_angle,
 };
 use homing_perception::AnyEstimator;
-use homing_planner::visual_target::{Approach, Decision, Ending, Look, Refinement};
+use homing_planner::visual_target::{Decision, Ending, Look, Refinement};
 use homing_sim::arena::Arena;
 use homing_sim::episode::{FloorPose, Viewpoint};
 use serde::{Deserialize, Serialize};
 
+use super::methods::Way;
 use super::pairs::{TargetPair, view};
 use crate::RunError;
 
@@ -84,62 +85,71 @@ pub struct PairRun {
     pub looks: Vec<LookRecord>,
 }
 
-/// Lets `estimator` and `approach` lead from a pair's start to its target. The body is put where a motion leads; where it
-/// cannot stand, at the nearest place on the straight way there at which it can.
-///
-/// # Errors
-/// [`RunError`] when a part fails; a target that is not reached is none.
-pub fn run_pair(
-    arena: &Arena,
-    pair: &TargetPair,
-    camera: &Viewpoint,
-    sensor: Sensor,
-    approach: Approach,
-    estimator: &mut AnyEstimator,
-) -> Result<PairRun, RunError> {
-    let photo = view(arena, camera, pair.target)?;
-    estimator.set_goal(GoalPhoto { id: pair.flat.max(1), rgb: Arc::new(photo.rgb), intrinsics: photo.camera })?;
-    let mut refinement = Refinement::new(approach);
-    let mut here = pair.start;
-    let mut looks = Vec::new();
-    let ending = loop {
-        let frame = frame(arena, camera, sensor, here, looks.len())?;
-        let estimate = estimator.estimate(&frame)?;
-        // The robot's odometry frame is the world's here: nothing depends on which.
-        let t_odom_base: Transform<Odom, Base> = PlanarPose::from(here).to_transform();
-        let look = Look { t_odom_base, t_base_camera: camera.t_base_camera(), sighting: &estimate.sighting };
-        looks.push(record(&look, estimate.n_matches, here, pair.target));
-        match refinement.next(&look) {
-            Decision::Move(to) => here = put(arena, here, to),
-            Decision::Done(ending) => break ending,
+/// A robot with a target view in mind.
+pub struct Robot<'a> {
+    arena: &'a Arena,
+    camera: Viewpoint,
+    estimator: &'a mut AnyEstimator,
+    /// What was seen from where: ways that begin alike look alike.
+    seen: Vec<(FloorPose, Sensor, GoalEstimate)>,
+}
+
+impl<'a> Robot<'a> {
+    /// `estimator` knows the target view.
+    pub fn new(arena: &'a Arena, camera: Viewpoint, estimator: &'a mut AnyEstimator) -> Self {
+        Self { arena, camera, estimator, seen: Vec::new() }
+    }
+
+    /// Goes from a pair's start towards its target. The body is put where a motion leads; where it cannot stand, at the
+    /// nearest place on the straight way there at which it can.
+    ///
+    /// # Errors
+    /// [`RunError`] when a part fails; a target that is not reached is none.
+    pub fn run(&mut self, pair: &TargetPair, way: &Way) -> Result<PairRun, RunError> {
+        let mut refinement = Refinement::new(way.approach);
+        let mut here = pair.start;
+        let mut looks = Vec::new();
+        let ending = loop {
+            let estimate = self.look(here, way.sensor)?;
+            // The world's frame serves as the odometry's: no decision depends on which it is.
+            let t_odom_base: Transform<Odom, Base> = PlanarPose::from(here).to_transform();
+            let t_base_camera = self.camera.t_base_camera();
+            let look = Look { t_odom_base, t_base_camera, sighting: &estimate.sighting };
+            looks.push(record(&look, estimate.n_matches, here, pair.target));
+            match refinement.next(&look) {
+                Decision::Move(to) => here = put(self.arena, here, to),
+                Decision::Done(ending) => break ending,
+            }
+        };
+        let (final_distance_m, final_heading_deg) = off(here.into(), pair.target);
+        Ok(PairRun {
+            success: final_distance_m < SUCCESS_M && final_heading_deg < SUCCESS_DEG,
+            final_distance_m,
+            final_heading_deg,
+            ending: words(ending).to_owned(),
+            end: here,
+            looks,
+        })
+    }
+
+    fn look(&mut self, at: FloorPose, sensor: Sensor) -> Result<GoalEstimate, RunError> {
+        if let Some((.., estimate)) = self.seen.iter().find(|(place, with, _)| (*place, *with) == (at, sensor)) {
+            return Ok(estimate.clone());
         }
-    };
-    let (final_distance_m, final_heading_deg) = off(here.into(), pair.target);
-    Ok(PairRun {
-        success: final_distance_m < SUCCESS_M && final_heading_deg < SUCCESS_DEG,
-        final_distance_m,
-        final_heading_deg,
-        ending: words(ending).to_owned(),
-        end: here,
-        looks,
-    })
+        let estimate = self.estimator.estimate(&frame(self.arena, &self.camera, sensor, at)?)?;
+        self.seen.push((at, sensor, estimate.clone()));
+        Ok(estimate)
+    }
 }
 
 /// What the robot's camera delivers at a place.
-fn frame(
-    arena: &Arena,
-    camera: &Viewpoint,
-    sensor: Sensor,
-    at: FloorPose,
-    n_looks: usize,
-) -> Result<RgbdFrame, RunError> {
+fn frame(arena: &Arena, camera: &Viewpoint, sensor: Sensor, at: FloorPose) -> Result<RgbdFrame, RunError> {
     let seen = view(arena, camera, at)?;
     let depth = match sensor {
         Sensor::RgbD => seen.depth,
         Sensor::Rgb => no_depth(&seen.rgb)?,
     };
-    let stamp = Stamp(n_looks as u64 * 1_000_000_000);
-    Ok(RgbdFrame::new(stamp, Arc::new(seen.rgb), Arc::new(depth), seen.camera)?)
+    Ok(RgbdFrame::new(Stamp(0), Arc::new(seen.rgb), Arc::new(depth), seen.camera)?)
 }
 
 fn no_depth(rgb: &RgbImage) -> Result<DepthImage, RunError> {
