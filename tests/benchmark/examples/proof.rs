@@ -16,8 +16,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut choice = FeatureChoice::default();
     if let [extractor, matcher] = features {
         let models = Path::new("nodes/perception/models");
-        choice.extractor = ExtractorChoice::resolve(&ModelName::Listed(extractor.clone()), models)?;
-        choice.matcher = MatcherChoice::resolve(&ModelName::Listed(matcher.clone()), models)?;
+        choice = FeatureChoice::of(
+            ExtractorChoice::resolve(&ModelName::Listed(extractor.clone()), models)?,
+            MatcherChoice::resolve(&ModelName::Listed(matcher.clone()), models)?,
+        );
     }
     let mut setups = Vec::new();
     for share in [0.0, 0.2, 0.3, 0.4, 0.5, 0.6] {

@@ -17,8 +17,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut choice = FeatureChoice::default();
     if let [extractor, matcher] = features {
         let models = Path::new("nodes/perception/models");
-        choice.extractor = ExtractorChoice::resolve(&ModelName::Listed(extractor.clone()), models)?;
-        choice.matcher = MatcherChoice::resolve(&ModelName::Listed(matcher.clone()), models)?;
+        choice = FeatureChoice::of(
+            ExtractorChoice::resolve(&ModelName::Listed(extractor.clone()), models)?,
+            MatcherChoice::resolve(&ModelName::Listed(matcher.clone()), models)?,
+        );
     }
     let mut total = RecallRow::default();
     for seed in first..first + n {

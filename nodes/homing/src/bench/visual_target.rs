@@ -8,7 +8,7 @@ use homing_benchmark::visual_target::bench::PairRuns;
 use homing_benchmark::visual_target::{
     Difficulty, Options, PairRun, PairSpec, Pipeline, Report, Solver, TargetPair, bench, contact_sheet,
 };
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
+use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName};
 use homing_sim::Viewpoint;
 use homing_sim::views::OVERLAP_MIN;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -98,13 +98,12 @@ fn pipelines(models: &Path) -> Vec<Pipeline> {
 }
 
 fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {
-    let features = FeatureChoice {
-        extractor: ExtractorChoice::resolve(&ModelName::Listed(extractor.to_owned()), models)?,
-        matcher: MatcherChoice::resolve(&ModelName::Listed(matcher.to_owned()), models)?,
-        // Pairs side by side use the cores better than the threads of one.
-        run: RunConfig { threads: 1, ..RunConfig::default() },
-        ..FeatureChoice::default()
-    };
+    let mut features = FeatureChoice::of(
+        ExtractorChoice::resolve(&ModelName::Listed(extractor.to_owned()), models)?,
+        MatcherChoice::resolve(&ModelName::Listed(matcher.to_owned()), models)?,
+    );
+    // Pairs side by side use the cores better than the threads of one.
+    features.run.threads = 1;
     if features.uses_models() {
         features.runtime()?;
     }

@@ -190,6 +190,13 @@ pub struct Parts {
 }
 
 impl FeatureChoice {
+    /// Two parts with their own settings: the confidence limit is the matcher's.
+    #[must_use]
+    pub fn of(extractor: ExtractorChoice, matcher: MatcherChoice) -> Self {
+        let matcher_config = MatcherConfig { confidence_min: matcher.confidence_min(), ..MatcherConfig::default() };
+        Self { extractor, matcher, matcher_config, ..Self::default() }
+    }
+
     /// Opens what is chosen. `config` has the settings of SIFT and of the ratio test.
     ///
     /// # Errors
