@@ -30,7 +30,7 @@ use crate::settings::FeatureArgs;
 ///
 /// milliseconds per stage; and, beside the first configuration, the difference on the same pairs with its interval.
 ///
-/// A default run estimates some 9,000 pairs of 1,000 views, which takes about four minutes for each configuration on two
+/// A default run estimates some 9,000 pairs of 1,400 views, which takes about four minutes for each configuration on two
 /// free cores; --pairs 500 is enough for a first look.
 #[derive(Args)]
 #[command(after_long_help = EXAMPLES)]
