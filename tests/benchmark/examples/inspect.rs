@@ -3,7 +3,7 @@
 //! Plan: what is known white, obstacles black, never seen grey (the planner's map over the true floor plan), the way in
 //! blue while exploring and orange while driving to the goal, the true goal a green arrow, right sightings green dots, wrong
 //! ones red. `goal.png` is the photo. With `wrong`, the image and the matched points of every wrong sighting are drawn too;
-//! with `blind` perception finds nothing, to watch exploration alone.
+//! with `blind` perception finds nothing, to watch exploration alone; with `own` it uses our own models instead of SIFT.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 use homing_benchmark::cause::{is_in_view, right_pose, sighted_pose};
 use homing_benchmark::{Policy, StepRecord, run_episode};
 use homing_core::{Cell, Mode, OccupancyGrid, PlanarPose, Sighting};
-use homing_perception::onnx::FeatureChoice;
+use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName};
 use homing_perception::{AnyEstimator, PerceptionConfig, SiftConfig};
 use homing_planner::PlannerConfig;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
@@ -43,7 +43,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let nothing = SiftConfig { keypoints_max: 8, side_max_px: 64, ..SiftConfig::default() };
     let sift = if has("blind") { nothing } else { SiftConfig::default() };
     let perception = PerceptionConfig { sift, ..PerceptionConfig::default() };
-    let estimator = AnyEstimator::open(perception, &FeatureChoice::default())?;
+    let models = Path::new("nodes/perception/models");
+    let own = |name: &str| ModelName::Listed(name.to_owned());
+    let features = if has("own") {
+        FeatureChoice::of(
+            ExtractorChoice::resolve(&own("homing-extractor"), models)?,
+            MatcherChoice::resolve(&own("homing-matcher"), models)?,
+        )
+    } else {
+        FeatureChoice::default()
+    };
+    let estimator = AnyEstimator::open(perception, &features)?;
     let mut marks = Vec::new();
     let mut map = None;
     let run = run_episode(&arena, &episode, estimator, PlannerConfig::default(), policy.build(), &mut |r| {
