@@ -1,6 +1,7 @@
 """Trains the matcher on the keypoints of a frozen extractor, which `training.features` found.
 
 `python -m training.train_matcher --data PAIRS --features KEYPOINTS --run RUN`, as many --features as --data, in that order.
+With `--start CHECKPOINT --transport-iterations N` the layers behind the fast matcher's learn to end with optimal transport.
 """
 
 import argparse
@@ -27,6 +28,8 @@ def add_matcher_options(parser: argparse.ArgumentParser) -> None:
     add_options(parser, steps=8000, batch=8)
     parser.add_argument("--features", type=Path, action="append", required=True, help="keypoints of the pair set of --data")
     parser.add_argument("--layers", type=int, default=MatcherConfig.layers)
+    parser.add_argument("--transport-iterations", type=int, default=0, help="Sinkhorn's, of the last layer; 0: double softmax")
+    parser.add_argument("--start", type=Path, help="checkpoint to go on from, whose fast matcher stays exactly as it is")
     parser.add_argument("--keypoints", type=int, nargs="+", default=(192, 256, 384), help="keypoints an image, one is drawn")
     parser.add_argument("--same-view", type=float, default=0.05, help="share of pairs that are two versions of one view")
 
@@ -39,7 +42,7 @@ def plan_from(options: argparse.Namespace) -> Plan:
         raise ValueError(f"{len(sets)} --data but {len(options.features)} --features: name one for each")
     read = [FeatureSet(s, Features(folder, s), share) for (s, share), folder in zip(sets, options.features)]
     pairs = FeaturePairs(read, options.seed, options.batch, list(options.keypoints), options.same_view)
-    matcher = Matcher(MatcherConfig(layers=options.layers))
+    matcher = Matcher(MatcherConfig(layers=options.layers, transport_iterations=options.transport_iterations))
     facts = {
         "data": described,
         "versions": [s.features.versions for s in read],
@@ -51,15 +54,26 @@ def plan_from(options: argparse.Namespace) -> Plan:
         "extractor_checkpoint_sha256": read[0].features.about["extractor_sha256"],
     }
 
+    if options.start:
+        facts["start"] = _start(matcher, options.start)
+
     def loss(model: Matcher, batch, autocast):
         with autocast():
             assignments = model(*batch.a, *batch.b)
-        return matcher_loss(assignments, batch.labels_a, batch.labels_b, model.config.fast_layers)
+        return matcher_loss(assignments, batch.labels_a, batch.labels_b, model.config)
 
     def batches(first: int):
         return pairs.batches(first, options.steps)
 
     return Plan("matcher", matcher, loss, batches, options.rate, options, facts)
+
+
+def _start(matcher: Matcher, path: Path) -> dict:
+    """Takes a trained matcher's weights and freezes those of the fast matcher; says where they came from."""
+    trained, facts = load_matcher(path, torch.device("cpu"))
+    matcher.load_state_dict(trained.state_dict())
+    matcher.freeze_fast_layers()
+    return {"seed": facts["seed"], "steps": facts["step"], "pairs": facts["pairs"], "minutes": round(facts["seconds"] / 60, 1)}
 
 
 def load_matcher(path: Path, device: torch.device) -> tuple[Matcher, dict]:
