@@ -1,8 +1,8 @@
 """The matcher: which keypoints of two images show the same point, if any.
 
 Self and cross attention over descriptors and positions (SuperGlue, Sarlin et al. 2020), with relative positions in self
-attention and a double softmax with matchabilities instead of optimal transport (LightGlue, Lindenberger et al. 2023). What
-makes it fit a CPU: 64 dimensions; self attention to the strongest keypoints only; and one similarity, bounded so that its
+attention. It ends with a double softmax and matchabilities (LightGlue, Lindenberger et al. 2023) where it is to be fast, and
+with SuperGlue's optimal transport, in `transport`, where it is to be accurate. What makes it fit a CPU: 64 dimensions; self attention to the strongest keypoints only; and one similarity, bounded so that its
 exponential needs no protection, which serves both directions of a cross layer and is at once an assignment. So every layer
 can be the last: a fast matcher is the first layers of an accurate one.
 
@@ -36,12 +36,12 @@ class MatcherConfig:
     anchors: int = 256
     # Channels of the similarity that compare where a keypoint is expected with where one is.
     place: int = 16
-    # Sinkhorn's iterations of the last layer's optimal transport; 0 leaves it a double softmax, as all others have.
-    transport_iterations: int = 0
+    # Sinkhorn's iterations where the accurate matcher ends: by optimal transport.
+    transport_iterations: int = 4
 
     def iterations_after(self, layer: int) -> int:
-        """Iterations of the transport by which this layer (from 1) assigns; 0 for a double softmax."""
-        return self.transport_iterations if layer == self.layers else 0
+        """Iterations of the transport by which a matcher ends after this layer (from 1); 0 for a double softmax."""
+        return self.transport_iterations if layer == self.layers > self.fast_layers else 0
 
     def as_dict(self) -> dict:
         """For checkpoints and the manifest."""

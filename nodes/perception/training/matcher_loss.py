@@ -5,7 +5,7 @@ import torch
 import torch.nn.functional as F
 
 from .geometry import Warp
-from .matcher import Assignment, MatcherConfig, log_matchable, mutual_matches
+from .matcher import Assignment, log_matchable, mutual_matches
 from .transport import transport, transported_matches
 
 # Partners lie within MATCH_PX of the exact warp; a keypoint with none within LONELY_PX is unmatched; between, undecided.
@@ -15,17 +15,22 @@ UNMATCHED, UNDECIDED = -1, -2
 CONFIDENCE_MIN = 0.2
 
 
-def matcher_loss(assignments: list[Assignment], labels_a: torch.Tensor, labels_b: torch.Tensor, config: MatcherConfig):
-    """Loss over all layers, those at which a matcher ends counting double; and parts for the log."""
+def matcher_loss(
+    assignments: list[Assignment], labels_a: torch.Tensor, labels_b: torch.Tensor, fast_layers: int, iterations: int = 0
+):
+    """Loss over all layers, those at which a matcher ends counting double; and parts for the log.
+
+    With `iterations` the last layer is judged by its transport's plan, as all others are by their double softmax.
+    """
     losses, parts = [], {}
     for layer, assignment in enumerate(assignments, 1):
-        iterations = config.iterations_after(layer)
-        positive, negative = _surprise(assignment, labels_a, labels_b, iterations)
-        ends = layer in (config.fast_layers, len(assignments))
+        own = iterations if layer == len(assignments) else 0
+        positive, negative = _surprise(assignment, labels_a, labels_b, own)
+        ends = layer in (fast_layers, len(assignments))
         losses.append((2.0 if ends else 1.0) * (positive + negative))
         if ends:
             name = "" if layer == len(assignments) else "_fast"
-            recall, precision = _accuracy(assignment, labels_a, iterations)
+            recall, precision = _accuracy(assignment, labels_a, own)
             parts |= {f"matched{name}": positive, f"alone{name}": negative}
             parts |= {f"recall{name}": recall, f"precision{name}": precision}
     parts["true"] = (labels_a >= 0).sum() / len(labels_a)
@@ -33,7 +38,7 @@ def matcher_loss(assignments: list[Assignment], labels_a: torch.Tensor, labels_b
 
 
 def _surprise(assignment, labels_a, labels_b, iterations: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """Negative log likelihoods, of the true matches and of being alone: of the plan where an assignment has iterations."""
+    """Negative log likelihoods, of the true matches and of being alone: of the plan if there are iterations."""
     log_match, log_alone_a, log_alone_b = (_of_plan if iterations else _of_softmaxes)(assignment, labels_a, iterations)
     matched, alone_a, alone_b = labels_a >= 0, labels_a == UNMATCHED, labels_b == UNMATCHED
     positive = -(log_match * matched).sum() / matched.sum().clamp(min=1)

@@ -198,7 +198,7 @@ def _check_matcher_trains(folder: Path, extractor: Path) -> None:
     assert np.isfinite(softmax.last["loss"])
     softmax.folder.mkdir(exist_ok=True)
     softmax._save(softmax._checkpoint_path())
-    start = ("--start", str(softmax._checkpoint_path()), "--transport-iterations", "4")
+    start = ("--start", str(softmax._checkpoint_path()))
     plan = _advanced(matcher_plan(_options(folder, "transport", *common, *start)), 2)
     assert np.isfinite(plan.last["loss"]) and not plan.last["dropped"]
     _check_fast_layers_stayed(softmax.model, plan.model)

@@ -1,7 +1,7 @@
 """Trains the matcher on the keypoints of a frozen extractor, which `training.features` found.
 
 `python -m training.train_matcher --data PAIRS --features KEYPOINTS --run RUN`, as many --features as --data, in that order.
-With `--start CHECKPOINT --transport-iterations N` the layers behind the fast matcher's learn to end with optimal transport.
+With `--start CHECKPOINT` the layers behind the fast matcher's are trained further, by the plan of the optimal transport.
 """
 
 import argparse
@@ -28,7 +28,6 @@ def add_matcher_options(parser: argparse.ArgumentParser) -> None:
     add_options(parser, steps=8000, batch=8)
     parser.add_argument("--features", type=Path, action="append", required=True, help="keypoints of the pair set of --data")
     parser.add_argument("--layers", type=int, default=MatcherConfig.layers)
-    parser.add_argument("--transport-iterations", type=int, default=0, help="Sinkhorn's, of the last layer; 0: double softmax")
     parser.add_argument("--start", type=Path, help="checkpoint to go on from, whose fast matcher stays exactly as it is")
     parser.add_argument("--keypoints", type=int, nargs="+", default=(192, 256, 384), help="keypoints an image, one is drawn")
     parser.add_argument("--same-view", type=float, default=0.05, help="share of pairs that are two versions of one view")
@@ -42,7 +41,7 @@ def plan_from(options: argparse.Namespace) -> Plan:
         raise ValueError(f"{len(sets)} --data but {len(options.features)} --features: name one for each")
     read = [FeatureSet(s, Features(folder, s), share) for (s, share), folder in zip(sets, options.features)]
     pairs = FeaturePairs(read, options.seed, options.batch, list(options.keypoints), options.same_view)
-    matcher = Matcher(MatcherConfig(layers=options.layers, transport_iterations=options.transport_iterations))
+    matcher = Matcher(MatcherConfig(layers=options.layers))
     facts = {
         "data": described,
         "versions": [s.features.versions for s in read],
@@ -54,13 +53,14 @@ def plan_from(options: argparse.Namespace) -> Plan:
         "extractor_checkpoint_sha256": read[0].features.about["extractor_sha256"],
     }
 
+    iterations = matcher.config.transport_iterations if options.start else 0
     if options.start:
         facts["start"] = _start(matcher, options.start)
 
     def loss(model: Matcher, batch, autocast):
         with autocast():
             assignments = model(*batch.a, *batch.b)
-        return matcher_loss(assignments, batch.labels_a, batch.labels_b, model.config)
+        return matcher_loss(assignments, batch.labels_a, batch.labels_b, model.config.fast_layers, iterations)
 
     def batches(first: int):
         return pairs.batches(first, options.steps)
@@ -82,6 +82,7 @@ def load_matcher(path: Path, device: torch.device) -> tuple[Matcher, dict]:
     matcher = Matcher(MatcherConfig(**state["facts"]["config"]))
     matcher.load_state_dict(state["model"])
     facts = {name: value for name, value in state.items() if name not in ("model", "optimizer")}
+    facts["facts"] = state["facts"] | {"config": matcher.config.as_dict()}
     return matcher.to(device).eval().requires_grad_(False), facts
 
 
