@@ -11,7 +11,7 @@ use std::sync::Arc;
 use homing_benchmark::cause::{is_in_view, right_pose, sighted_pose};
 use homing_benchmark::{Policy, StepRecord, run_episode};
 use homing_core::{Cell, Mode, OccupancyGrid, PlanarPose, Sighting};
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName};
+use homing_perception::onnx::FeatureChoice;
 use homing_perception::{AnyEstimator, PerceptionConfig, SiftConfig};
 use homing_planner::PlannerConfig;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
@@ -43,13 +43,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let nothing = SiftConfig { keypoints_max: 8, side_max_px: 64, ..SiftConfig::default() };
     let sift = if has("blind") { nothing } else { SiftConfig::default() };
     let perception = PerceptionConfig { sift, ..PerceptionConfig::default() };
-    let models = Path::new("nodes/perception/models");
-    let own = |name: &str| ModelName::Listed(name.to_owned());
     let features = if has("own") {
-        FeatureChoice::of(
-            ExtractorChoice::resolve(&own("homing-extractor"), models)?,
-            MatcherChoice::resolve(&own("homing-matcher"), models)?,
-        )
+        FeatureChoice::listed("homing-extractor", "homing-matcher", Path::new("nodes/perception/models"))?
     } else {
         FeatureChoice::default()
     };

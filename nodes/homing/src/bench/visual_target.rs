@@ -8,7 +8,7 @@ use homing_benchmark::visual_target::bench::PairRuns;
 use homing_benchmark::visual_target::{
     Difficulty, Options, PairRun, PairSpec, Pipeline, Report, Solver, TargetPair, bench, contact_sheet,
 };
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName};
+use homing_perception::onnx::FeatureChoice;
 use homing_sim::Viewpoint;
 use homing_sim::views::OVERLAP_MIN;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -98,10 +98,7 @@ fn pipelines(models: &Path) -> Vec<Pipeline> {
 }
 
 fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {
-    let mut features = FeatureChoice::of(
-        ExtractorChoice::resolve(&ModelName::Listed(extractor.to_owned()), models)?,
-        MatcherChoice::resolve(&ModelName::Listed(matcher.to_owned()), models)?,
-    );
+    let mut features = FeatureChoice::listed(extractor, matcher, models)?;
     // Pairs side by side use the cores better than the threads of one.
     features.run.threads = 1;
     if features.uses_models() {

@@ -197,6 +197,16 @@ impl FeatureChoice {
         Self { extractor, matcher, matcher_config, ..Self::default() }
     }
 
+    /// The same, by the names of the manifest in `models`.
+    ///
+    /// # Errors
+    /// [`ChoiceError`] for a name that is none, or a manifest that cannot be read.
+    pub fn listed(extractor: &str, matcher: &str, models: &Path) -> Result<Self, ChoiceError> {
+        let name = |name: &str| ModelName::Listed(name.to_owned());
+        let extractor = ExtractorChoice::resolve(&name(extractor), models)?;
+        Ok(Self::of(extractor, MatcherChoice::resolve(&name(matcher), models)?))
+    }
+
     /// Opens what is chosen. `config` has the settings of SIFT and of the ratio test.
     ///
     /// # Errors
