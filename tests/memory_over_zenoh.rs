@@ -33,7 +33,7 @@ async fn a_photo_of_a_place_that_was_passed_is_driven_to_without_a_search() {
     back.id = 2;
     let second = Mission::begin(&session, &back).await;
     let state = second.state().await;
-    let goal = state.goal.expect("the memory knows the place at the first step").pose;
+    let goal = state.goal.clone().unwrap().pose;
     assert!(goal.distance_to(0.0, 0.0) < 0.3 && goal.yaw_rad.abs() < 0.1, "{goal:?}");
     assert_eq!(state.mode, Mode::Exploit, "{}", state.reason);
     assert!(perception.said().contains("seen before: the goal in"), "{}", perception.said());

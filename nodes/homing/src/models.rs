@@ -83,9 +83,16 @@ fn describe(entry: &Entry) {
     println!("{} ({role}, contract {}): {}, {} bytes", entry.name, entry.contract, entry.file, entry.bytes);
     println!("  sha256 {}", entry.sha256);
     println!("  licence {}, trained at {}", entry.licence, entry.training.commit);
-    if !entry.accuracy.is_null() {
-        println!("  accuracy {}", entry.accuracy);
+    for (method, share) in solved(&entry.accuracy) {
+        println!("  of 300 pairs of views of validation flats {share:.2} within 0.25 m and 10 deg, with {method}");
     }
+}
+
+/// What the manifest says of the validation pairs: matching method, share solved.
+fn solved(accuracy: &serde_json::Value) -> Vec<(&str, f64)> {
+    let methods = accuracy.get("validation").and_then(serde_json::Value::as_object);
+    let solved = |figures: &serde_json::Value| figures.get("all")?.get("0.25m_10deg")?.as_f64();
+    methods.into_iter().flatten().filter_map(|(name, figures)| Some((name.as_str(), solved(figures)?))).collect()
 }
 
 fn contract_of(entry: &Entry) -> anyhow::Result<AnyContract> {

@@ -100,7 +100,7 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
     /// Faults of the extractor, the matcher or OpenCV; never what the image shows.
     pub fn estimate(&mut self, frame: &RgbdFrame) -> Result<GoalEstimate, PerceptionError> {
         if self.goal.is_none() {
-            return Ok(unseen(frame.stamp));
+            return Ok(no_goal(frame.stamp));
         }
         self.estimate_and_keep(frame).map(|(estimate, _)| estimate)
     }
@@ -132,7 +132,7 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
     /// Faults of the matcher or OpenCV; never what the image shows.
     pub fn register(&mut self, frame: &SeenFrame) -> Result<GoalEstimate, PerceptionError> {
         let mut times = StageTimes::default();
-        let Some(goal) = &self.goal else { return Ok(unseen(frame.stamp)) };
+        let Some(goal) = &self.goal else { return Ok(no_goal(frame.stamp)) };
         let query = &frame.features;
         let matches = timed(&mut times.matching, || self.matcher.match_features(query, &goal.features))
             .map_err(|source| stage(self.matcher.name(), source))?;
@@ -162,7 +162,8 @@ fn stage(name: &str, source: impl core::error::Error + Send + Sync + 'static) ->
     PerceptionError::Stage { name: name.to_owned(), source: Box::new(source) }
 }
 
-fn unseen(stamp: Stamp) -> GoalEstimate {
+/// The answer where there is no goal to look for.
+pub(crate) fn no_goal(stamp: Stamp) -> GoalEstimate {
     GoalEstimate {
         stamp,
         goal_id: 0,

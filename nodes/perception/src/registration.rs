@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use homing_core::{GoalEstimate, GoalPhoto, RgbdFrame, Sighting, StageTimes, Stamp, UnseenReason};
+use homing_core::{GoalEstimate, GoalPhoto, RgbdFrame, Sighting, Stamp};
 
+use crate::estimator::no_goal;
 use crate::memory::{KeyframeMemory, MemoryConfig};
 use crate::onnx::FeatureChoice;
 use crate::{PerceptionConfig, PerceptionError, ResilientEstimator};
@@ -108,16 +109,5 @@ impl Registration {
             self.memory.clear();
         }
         result
-    }
-}
-
-fn no_goal(stamp: Stamp) -> GoalEstimate {
-    GoalEstimate {
-        stamp,
-        goal_id: 0,
-        sighting: Sighting::NotSeen { reason: UnseenReason::NoGoal },
-        n_matches: 0,
-        matched_points: Vec::new(),
-        times: StageTimes::default(),
     }
 }

@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import torch
 
+from .exported import ExportedMatcher
 from .extractor import ExportedExtractor, keypoint_score, sample_descriptors, select_keypoints
-from .matcher import ExportedMatcher, normalised_points
+from .matcher import normalised_points
 from .keypoint_set import NMS_RADIUS
 from .train_extractor import load_extractor
 from .train_matcher import load_matcher

@@ -58,6 +58,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--limit", type=int, default=400, help="pairs measured")
     parser.add_argument("--keypoints", type=int, default=1024)
     parser.add_argument("--confidence", type=float, default=0.2, help="least confidence of a match by the matcher")
+    parser.add_argument("--confidence-accurate", type=float, help="the same of the accurate matcher, if another")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--curve", type=Path, nargs="*", help="training runs whose snapshots are measured and plotted")
@@ -104,7 +105,8 @@ def _matches_by(method: str, options: argparse.Namespace):
         return lambda _, features: dual_softmax_matches(*features["narrow"])
     if method == "wide":
         return lambda _, features: ratio_matches(*features["wide"])
-    matcher = LearnedMatcher(options.matcher, options.confidence, fast=method == "fast")
+    own = options.confidence_accurate if method == "accurate" else None
+    matcher = LearnedMatcher(options.matcher, options.confidence if own is None else own, fast=method == "fast")
     return lambda pair, features: matcher(*features["narrow"], pair.images[0].shape, pair.images[1].shape)
 
 

@@ -1,6 +1,7 @@
 """Exports trained checkpoints to ONNX, checks them against PyTorch, times them, and writes the manifest.
 
 `python -m training.export --extractor RUN/checkpoint.pt [--matcher RUN/checkpoint.pt] --accuracy FILE.json --out models`
+The accurate matcher may come from a checkpoint of its own (`--accurate`), of which the first layers are the fast one's.
 """
 
 import argparse
@@ -14,9 +15,8 @@ import numpy as np
 import onnxruntime
 import torch
 
-from .exported import ExportedR2d2
+from .exported import ExportedMatcher, ExportedR2d2
 from .extractor import ExportedExtractor
-from .matcher import ExportedMatcher
 from .train_extractor import load_extractor
 from .train_matcher import load_matcher
 
@@ -33,7 +33,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--extractor", type=Path, required=True)
     parser.add_argument("--matcher", type=Path)
+    parser.add_argument("--accurate", type=Path, help="checkpoint of the accurate matcher, if not that of --matcher")
     parser.add_argument("--confidence", type=float, default=0.2, help="least confidence of a match, chosen on validation")
+    parser.add_argument("--confidence-accurate", type=float, help="the same of the accurate matcher, if another")
     parser.add_argument("--accuracy", type=Path, action="append", default=[], help="JSON that training.evaluate wrote")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "models")
     options = parser.parse_args()
@@ -42,8 +44,10 @@ def main() -> None:
     entries = [export_extractor(options.extractor, options.out, accuracy)]
     entries.append(export_wide(options.extractor, options.out, accuracy))
     if options.matcher:
-        for name in ("homing-matcher", "homing-matcher-accurate"):
-            entries.append(export_matcher(name, options, accuracy, entries[0]))
+        entries.append(export_matcher("homing-matcher", options, accuracy, entries[0]))
+        options.matcher = options.accurate or options.matcher
+        options.confidence = options.confidence if options.confidence_accurate is None else options.confidence_accurate
+        entries.append(export_matcher("homing-matcher-accurate", options, accuracy, entries[0]))
     manifest = {"format": 1, "grey": "0.299 R + 0.587 G + 0.114 B, 0 to 255", "models": entries}
     (options.out / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
     print(f"{sum(e['bytes'] for e in entries) / 1e6:.2f} MB in {options.out}")
@@ -122,6 +126,8 @@ def export_matcher(name: str, options: argparse.Namespace, accuracy: dict, extra
         },
         "at_least": "1 keypoint in either image",
     }
+    iterations = matcher.config.iterations_after(layers)
+    contract["assignment"] = f"optimal transport, {iterations} iterations" if iterations else "double softmax, matchabilities"
     contract["confidence_min"], contract["layers"] = options.confidence, layers
     entry = _entry(name, "matcher", path, facts, accuracy, contract, milliseconds)
     return entry | {"extractor": extractor_entry["name"], "extractor_sha256": extractor_entry["sha256"]}
@@ -203,6 +209,15 @@ def _time(path: Path, inputs, names: list[str], size: str) -> dict:
     return found
 
 
+# Of the methods that `training.evaluate` measures, the one that stands for a model.
+OWN_METHOD = {
+    "homing-extractor": "mutual",
+    "homing-r2d2": "wide",
+    "homing-matcher": "fast",
+    "homing-matcher-accurate": "accurate",
+}
+
+
 def _entry(name: str, kind: str, path: Path, facts: dict, accuracy: dict, contract: dict, milliseconds: dict) -> dict:
     data = path.read_bytes()
     return {
@@ -223,7 +238,7 @@ def _entry(name: str, kind: str, path: Path, facts: dict, accuracy: dict, contra
             **facts["facts"],
         },
         "milliseconds_cpu": milliseconds,
-        "accuracy": accuracy,
+        "accuracy": {pairs: {OWN_METHOD[name]: found.get(OWN_METHOD[name])} for pairs, found in accuracy.items()},
     }
 
 

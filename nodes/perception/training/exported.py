@@ -5,6 +5,8 @@ import torch.nn.functional as F
 from torch import nn
 
 from .extractor import CELL, ExportedExtractor, Extractor, keypoint_score, largest_near
+from .matcher import Matcher, mutual_matches
+from .transport import transported_matches
 
 # Contract "r2d2" keeps what reaches 0.7 on both maps. Roots bring scores near one another; 0.002 becomes 0.7.
 SCORE_MIN, LIMIT = 0.002, 0.7
@@ -34,3 +36,19 @@ class ExportedR2d2(nn.Module):
         peak = (score >= largest_near(score, 2)).float()
         large = F.interpolate(reliability, scale_factor=float(CELL), mode="bilinear")
         return descriptors, LIMIT + (1 - LIMIT) * large, repeatability * peak
+
+
+class ExportedMatcher(nn.Module):
+    """What is exported: two images' keypoints, without a batch axis, to matches (k of image a, -1 without) and confidences."""
+
+    def __init__(self, matcher: Matcher, layers: int):
+        super().__init__()
+        self.matcher, self.layers = matcher, layers
+
+    def forward(self, keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1):
+        inputs = (keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1)
+        assignments = self.matcher(*(x[None] for x in inputs), layers=self.layers)
+        iterations = self.matcher.config.iterations_after(self.layers)
+        last = assignments[-1]
+        matches, confidences = transported_matches(last, iterations) if iterations else mutual_matches(last)
+        return matches[0], confidences[0]

@@ -1,9 +1,9 @@
 """The matcher: which keypoints of two images show the same point, if any.
 
 Self and cross attention over descriptors and positions (SuperGlue, Sarlin et al. 2020), with relative positions in self
-attention and a double softmax with matchabilities instead of optimal transport (LightGlue, Lindenberger et al. 2023). What
-makes it fit a CPU: 64 dimensions; self attention to the strongest keypoints only; and one similarity, bounded so that its
-exponential needs no protection, which serves both directions of a cross layer and is at once an assignment. So every layer
+attention. It ends with a double softmax and matchabilities (LightGlue, Lindenberger et al. 2023) where it is to be fast, and
+with SuperGlue's optimal transport, in `transport`, where it is to be accurate. What makes it fit a CPU: 64 dimensions; self
+attention to the strongest keypoints only; and one similarity, bounded so that its exponential needs no protection, which serves both directions of a cross layer and is at once an assignment. So every layer
 can be the last: a fast matcher is the first layers of an accurate one.
 
 A cross layer also says in plain numbers where a keypoint would go, how surely, and how alone it is: its neighbours then learn
@@ -36,6 +36,12 @@ class MatcherConfig:
     anchors: int = 256
     # Channels of the similarity that compare where a keypoint is expected with where one is.
     place: int = 16
+    # Sinkhorn's iterations where the accurate matcher ends: by optimal transport.
+    transport_iterations: int = 4
+
+    def iterations_after(self, layer: int) -> int:
+        """Iterations of the transport by which a matcher ends after this layer (from 1); 0 for a double softmax."""
+        return self.transport_iterations if layer == self.layers > self.fast_layers else 0
 
     def as_dict(self) -> dict:
         """For checkpoints and the manifest."""
@@ -200,6 +206,13 @@ class Matcher(nn.Module):
             assignments.append(self.assign_layers[layer](x, y))
         return assignments
 
+    def freeze_fast_layers(self) -> None:
+        """Leaves only what comes behind the fast matcher's last assignment to be trained."""
+        fast = self.config.fast_layers
+        self.requires_grad_(False)
+        for behind in (self.cross_layers[fast - 1 :], self.self_layers[fast:], self.assign_layers[fast:]):
+            behind.requires_grad_(True)
+
     def _embedded(self, points: torch.Tensor, descriptors: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
         # Components of about one, as the layers expect.
         descriptors = self.widen(descriptors * self.config.descriptor**0.5)
@@ -236,20 +249,6 @@ def mutual_matches(assignment: Assignment) -> tuple[torch.Tensor, torch.Tensor]:
     partner_back = (2 * (y @ x.transpose(1, 2)) + own[:, None]).argmax(2)
     mutual = partner_back.gather(1, partner) == torch.arange(x.shape[1], device=x.device)
     return torch.where(mutual, partner, -1), torch.where(mutual, torch.exp(best + own), torch.zeros_like(best))
-
-
-class ExportedMatcher(nn.Module):
-    """What is exported: two images' keypoints, without a batch axis, to matches (k of image a, -1 without) and confidences."""
-
-    def __init__(self, matcher: Matcher, layers: int):
-        super().__init__()
-        self.matcher, self.layers = matcher, layers
-
-    def forward(self, keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1):
-        inputs = (keypoints0, descriptors0, scores0, keypoints1, descriptors1, scores1)
-        assignments = self.matcher(*(x[None] for x in inputs), layers=self.layers)
-        matches, confidences = mutual_matches(assignments[-1])
-        return matches[0], confidences[0]
 
 
 def normalised_points(points: torch.Tensor, width: int, height: int) -> torch.Tensor:

@@ -11,7 +11,7 @@ from . import augment
 from .extractor import Extractor
 from .features import write as write_features
 from .geometry import View, Warp, transform_points
-from .matcher import Matcher, log_probability, mutual_matches
+from .matcher import Assignment, Matcher, log_probability, mutual_matches
 from .matcher_loss import UNMATCHED, match_labels
 from .synthetic import write_set
 from .train_extractor import add_extractor_options
@@ -19,6 +19,7 @@ from .train_extractor import plan_from as extractor_plan
 from .train_matcher import add_matcher_options
 from .train_matcher import plan_from as matcher_plan
 from .trainer import Run
+from .transport import log_plan, transport, transported_matches
 
 
 def main() -> None:
@@ -32,6 +33,8 @@ def main() -> None:
             check_warp_sees_occlusion,
             check_homography_round_trip,
             check_matches_are_the_best_of_the_assignment,
+            check_transport_is_that_of_the_definition,
+            check_transport_moves_all_masses,
             check_fast_matcher_is_the_first_layers,
             check_heat_map_finds_blobs,
             check_labels_are_mutual,
@@ -106,6 +109,39 @@ def check_matches_are_the_best_of_the_assignment() -> None:
     assert torch.allclose(confidences, best * mutual, rtol=1e-3, atol=1e-6) and float(probability.sum(2).max()) <= 1 + 1e-4
 
 
+def _random_assignment(n: int, count_a: int, count_b: int) -> Assignment:
+    with torch.no_grad():
+        return Matcher()(*_random_keypoints(n, count_a), *_random_keypoints(n, count_b))[-1]
+
+
+def check_transport_is_that_of_the_definition() -> None:
+    """The plan by products with vectors is the one in logarithms, and the matches are its mutual maxima."""
+    assignment = _random_assignment(2, 30, 41)
+    plan, log = transport(assignment, 4), log_plan(Assignment(*(part.double() for part in assignment)), 4)
+    between = log[:, :-1, :-1].exp().float()
+    assert torch.allclose(plan.u * plan.weights * plan.v, between, rtol=1e-3, atol=1e-7)
+    assert torch.allclose(plan.alone_a, log[:, :-1, -1].exp().float(), rtol=1e-3, atol=1e-7)
+    assert torch.allclose(plan.alone_b, log[:, -1, :-1].exp().float(), rtol=1e-3, atol=1e-7)
+    matches, confidences = transported_matches(assignment, 4)
+    best, partner = between.max(2)
+    mutual = between.argmax(1).gather(1, partner) == torch.arange(30)
+    assert torch.equal(matches, torch.where(mutual, partner, -1)) and mutual.any()
+    assert torch.allclose(confidences, best * mutual, rtol=1e-3, atol=1e-7)
+
+
+def check_transport_moves_all_masses() -> None:
+    """Rows and columns of a plan sum to their masses; the first normalisation leaves a keypoint what its matchability says."""
+    assignment = _random_assignment(1, 30, 41)
+    plan = transport(assignment, 200)
+    between = plan.u * plan.weights * plan.v
+    assert torch.allclose(between.sum(2) + plan.alone_a, torch.ones(1, 30), atol=1e-3)
+    assert torch.allclose(between.sum(1) + plan.alone_b, torch.ones(1, 41), atol=1e-3)
+    whole = log_plan(assignment, 200).exp()
+    assert abs(float(whole[:, -1].sum()) - 41) < 0.05 and abs(float(whole[:, :, -1].sum()) - 30) < 0.05
+    first = transport(assignment, 1).u[..., 0] * assignment.weights.sum(2)
+    assert torch.allclose(first, torch.sigmoid(assignment.logit_x), rtol=1e-4)
+
+
 def check_fast_matcher_is_the_first_layers() -> None:
     """Asked for fewer layers, the matcher gives what it gave after them."""
     matcher, keypoints = Matcher(), _random_keypoints(1, 20) + _random_keypoints(1, 25)
@@ -152,13 +188,29 @@ def check_resume_gives_the_same_next_step(folder: Path) -> None:
 
 
 def _check_matcher_trains(folder: Path, extractor: Path) -> None:
-    """Keypoints are found, and the matcher makes two steps on them."""
+    """Keypoints are found; the matcher makes two steps on them, and its layers behind the fast one's two more by transport."""
     arguments = argparse.Namespace(
         extractor=extractor, data=folder / "rooms", out=folder / "features", versions=2, seed=0, part="0/1"
     )
     write_features(arguments)
-    options = _options(folder, "matcher", "--features", str(folder / "features"), "--keypoints", "64")
-    assert np.isfinite(_advanced(matcher_plan(options), 2).last["loss"])
+    common = ("--features", str(folder / "features"), "--keypoints", "64")
+    softmax = _advanced(matcher_plan(_options(folder, "matcher", *common)), 2)
+    assert np.isfinite(softmax.last["loss"])
+    softmax.folder.mkdir(exist_ok=True)
+    softmax._save(softmax._checkpoint_path())
+    start = ("--start", str(softmax._checkpoint_path()))
+    plan = _advanced(matcher_plan(_options(folder, "transport", *common, *start)), 2)
+    assert np.isfinite(plan.last["loss"]) and not plan.last["dropped"]
+    _check_fast_layers_stayed(softmax.model, plan.model)
+
+
+def _check_fast_layers_stayed(before: Matcher, after: Matcher) -> None:
+    """The fast matcher says the same after the rest was trained further; the whole one does not."""
+    keypoints = _random_keypoints(1, 20) + _random_keypoints(1, 25)
+    with torch.no_grad():
+        old, new = before.eval()(*keypoints), after.eval()(*keypoints)
+    fast = before.config.fast_layers
+    assert torch.equal(old[fast - 1].weights, new[fast - 1].weights) and not torch.equal(old[-1].weights, new[-1].weights)
 
 
 def _options(folder: Path, run: str, *more: str) -> argparse.Namespace:

@@ -14,6 +14,8 @@ use crate::ladder::{Climb, LadderConfig, Standing};
 
 /// Squared Mahalanobis distance that 99.9 % of agreeing (x, y, yaw) stay below.
 const GATE: f64 = 16.3;
+/// What a measurement must cover to support a place that is believed already, as a share of what opens a new one.
+const KNOWN_PLACE: f64 = 0.65;
 const HYPOTHESES_MAX: usize = 8;
 const LIARS_MAX: usize = 16;
 
@@ -68,6 +70,8 @@ pub enum Joined {
     Opened,
     /// It covers too little of the view for how near the goal should be.
     Weak,
+    /// The same, and it names the place that is believed already: it speaks neither for it nor against it.
+    Faint,
     /// Its place lied before.
     Refused,
 }
@@ -189,16 +193,20 @@ impl GoalFilter {
 
     /// Fuses a measurement with the hypothesis it agrees with best, or opens a new one.
     pub fn join(&mut self, measurement: &Measurement, step: u64) -> Joined {
-        if !measurement.evidence.suffices(measurement.range_m, measurement.turn_rad, self.rigour) {
-            return Joined::Weak;
-        }
         let closest = (0..self.hypotheses.len())
             .map(|i| (self.hypotheses[i].distance_square(measurement), i))
             .filter(|(square, _)| *square <= GATE)
             .min_by(|a, b| a.0.total_cmp(&b.0));
+        let suffices = |rigour| measurement.evidence.suffices(measurement.range_m, measurement.turn_rad, rigour);
         if let Some((_, i)) = closest {
-            self.hypotheses[i].fuse(measurement, step);
-            return Joined::Fused;
+            if suffices(KNOWN_PLACE * self.rigour) {
+                self.hypotheses[i].fuse(measurement, step);
+                return Joined::Fused;
+            }
+            return if Some(i) == self.best_index(step) { Joined::Faint } else { Joined::Weak };
+        }
+        if !suffices(self.rigour) {
+            return Joined::Weak;
         }
         if self
             .liars

@@ -3,7 +3,7 @@
 //! Plan: what is known white, obstacles black, never seen grey (the planner's map over the true floor plan), the way in
 //! blue while exploring and orange while driving to the goal, the true goal a green arrow, right sightings green dots, wrong
 //! ones red. `goal.png` is the photo. With `wrong`, the image and the matched points of every wrong sighting are drawn too;
-//! with `blind` perception finds nothing, to watch exploration alone.
+//! with `blind` perception finds nothing, to watch exploration alone; with `own` it uses our own models instead of SIFT.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -43,7 +43,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let nothing = SiftConfig { keypoints_max: 8, side_max_px: 64, ..SiftConfig::default() };
     let sift = if has("blind") { nothing } else { SiftConfig::default() };
     let perception = PerceptionConfig { sift, ..PerceptionConfig::default() };
-    let estimator = AnyEstimator::open(perception, &FeatureChoice::default())?;
+    let features = if has("own") {
+        FeatureChoice::listed("homing-extractor", "homing-matcher", Path::new("nodes/perception/models"))?
+    } else {
+        FeatureChoice::default()
+    };
+    let estimator = AnyEstimator::open(perception, &features)?;
     let mut marks = Vec::new();
     let mut map = None;
     let run = run_episode(&arena, &episode, estimator, PlannerConfig::default(), policy.build(), &mut |r| {

@@ -7,18 +7,16 @@ use homing_benchmark::perception::{
     Finding, MeasureOptions, Measured, PairSource, Setup, SimulatedPairs, Unregistered, measure,
 };
 use homing_perception::PerceptionConfig;
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName};
+use homing_perception::onnx::FeatureChoice;
 use homing_sim::views::{Cameras, ViewSpec};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [n, features @ ..] = arguments.as_slice() else { return Err("proof N_FLATS [EXTRACTOR MATCHER]".into()) };
-    let mut choice = FeatureChoice::default();
-    if let [extractor, matcher] = features {
-        let models = Path::new("nodes/perception/models");
-        choice.extractor = ExtractorChoice::resolve(&ModelName::Listed(extractor.clone()), models)?;
-        choice.matcher = MatcherChoice::resolve(&ModelName::Listed(matcher.clone()), models)?;
-    }
+    let choice = match features {
+        [extractor, matcher] => FeatureChoice::listed(extractor, matcher, Path::new("nodes/perception/models"))?,
+        _ => FeatureChoice::default(),
+    };
     let mut setups = Vec::new();
     for share in [0.0, 0.2, 0.3, 0.4, 0.5, 0.6] {
         let mut perception = PerceptionConfig::default();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use homing_benchmark::recall::{RecallRow, RecallSpec, recall};
 use homing_perception::memory::MemoryConfig;
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName};
+use homing_perception::onnx::FeatureChoice;
 use homing_perception::{PerceptionConfig, Registration};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,12 +14,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("recall FIRST_SEED N [EXTRACTOR MATCHER]".into());
     };
     let (first, n): (u64, u64) = (first.parse()?, n.parse()?);
-    let mut choice = FeatureChoice::default();
-    if let [extractor, matcher] = features {
-        let models = Path::new("nodes/perception/models");
-        choice.extractor = ExtractorChoice::resolve(&ModelName::Listed(extractor.clone()), models)?;
-        choice.matcher = MatcherChoice::resolve(&ModelName::Listed(matcher.clone()), models)?;
-    }
+    let choice = match features {
+        [extractor, matcher] => FeatureChoice::listed(extractor, matcher, Path::new("nodes/perception/models"))?,
+        _ => FeatureChoice::default(),
+    };
     let mut total = RecallRow::default();
     for seed in first..first + n {
         let mut registration = Registration::open(PerceptionConfig::default(), MemoryConfig::default(), &choice)?;

@@ -26,14 +26,13 @@ pub fn setup(text: &str, models: &Path) -> anyhow::Result<Setup> {
     };
     let mut setup = Setup {
         name: label.to_owned(),
-        features: FeatureChoice {
-            extractor: ExtractorChoice::resolve(&model(extractor)?, models)?,
-            matcher: match matcher {
+        features: FeatureChoice::of(
+            ExtractorChoice::resolve(&model(extractor)?, models)?,
+            match matcher {
                 Some(name) => MatcherChoice::resolve(&model(name)?, models)?,
                 None => matcher_of(extractor, models)?,
             },
-            ..FeatureChoice::default()
-        },
+        ),
         perception: PerceptionConfig::default(),
     };
     for part in parts {
@@ -79,7 +78,9 @@ fn turn(setup: &mut Setup, key: &str, value: &str) -> anyhow::Result<()> {
         }
         "ratio" => setup.perception.ratio_max = value.parse()?,
         "confidence" => setup.features.matcher_config.confidence_min = value.parse()?,
-        _ => bail!("{key:?} is none of solver, keypoints, ratio, confidence; a label comes last"),
+        "patches" => setup.perception.gates.patch_share_min = value.parse()?,
+        "gate" => setup.perception.gates.error_rad_max = value.parse::<f64>()?.to_radians(),
+        _ => bail!("{key:?} is none of solver, keypoints, ratio, confidence, patches, gate; a label comes last"),
     }
     Ok(())
 }

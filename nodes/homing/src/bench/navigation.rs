@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::Args;
 use homing_benchmark::{BenchOptions, EpisodeRow, bench};
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
+use homing_perception::onnx::FeatureChoice;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{can_be_written, seeds};
@@ -42,13 +42,9 @@ pub fn run(args: NavigationArgs) -> anyhow::Result<Ended> {
         Policy::Straight => homing_benchmark::Policy::Straight,
         Policy::Frontier => homing_benchmark::Policy::Frontier,
     };
-    let features = FeatureChoice {
-        extractor: ExtractorChoice::resolve(&ModelName::Listed(args.features.extractor), &args.models)?,
-        matcher: MatcherChoice::resolve(&ModelName::Listed(args.features.matcher), &args.models)?,
-        // Episodes side by side use the cores better than the threads of one.
-        run: RunConfig { threads: 1, ..RunConfig::default() },
-        ..FeatureChoice::default()
-    };
+    let mut features = FeatureChoice::listed(&args.features.extractor, &args.features.matcher, &args.models)?;
+    // Episodes side by side use the cores better than the threads of one.
+    features.run.threads = 1;
     let options = BenchOptions { policy, features, threads: args.threads, ..BenchOptions::default() };
     let seeds: Vec<u64> = args.seeds.collect();
     if seeds.len() > 100_000 {

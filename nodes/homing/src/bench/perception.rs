@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use homing_benchmark::perception::{
-    Class, MeasureOptions, Measured, PairSource, PerceptionReport, ReportPlan, Setup, SimulatedPairs, measure, plots,
-    time_stages,
+    Class, MeasureOptions, Measured, PairSource, PerceptionReport, ReportPlan, Setup, SimulatedPairs, Unregistered,
+    measure, plots, time_stages,
 };
 use homing_robot::Recording;
 use homing_sim::views::{Cameras, ViewSpec};
@@ -30,7 +30,7 @@ use crate::settings::FeatureArgs;
 ///
 /// milliseconds per stage; and, beside the first configuration, the difference on the same pairs with its interval.
 ///
-/// A default run estimates some 9,000 pairs of 1,000 views, which takes about four minutes for each configuration on two
+/// A default run estimates some 9,000 pairs of 1,400 views, which takes about four minutes for each configuration on two
 /// free cores; --pairs 500 is enough for a first look.
 #[derive(Args)]
 #[command(after_long_help = EXAMPLES)]
@@ -61,6 +61,11 @@ pub struct PerceptionArgs {
     /// What takes the views.
     #[arg(long, value_enum, default_value_t = CameraKind::Robot)]
     cameras: CameraKind,
+
+    /// Depth as a cheap camera gives it: from a sensor beside the colour camera, with one focal length said for both, as in
+    /// 7-Scenes
+    #[arg(long, conflicts_with = "rgbd")]
+    unregistered: bool,
     /// Flats side by side while accuracy is measured, on one thread each; 0 for one per core.
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -80,7 +85,7 @@ pub struct PerceptionArgs {
 
 const EXAMPLES: &str = "\
 A configuration is EXTRACTOR[+MATCHER], and after commas: solver=lo-ransac | gravity |
-epnp-ransac | sling-heading, keypoints=N, ratio=R, confidence=C, and last label=TEXT.
+epnp-ransac | sling-heading, keypoints=N, ratio=R, confidence=C, patches=P, gate=DEGREES, and last label=TEXT.
 Extractor and matcher are names as `homing models` lists them, or CONTRACT=FILE.
 Without a matcher: the model of the extractor's name, else mutual-nearest.
 
@@ -164,7 +169,11 @@ impl Task {
             CameraKind::Robot => (Cameras::ROBOT, "the robot's camera (640x480, 120 deg, level, 1.25 m up)"),
             CameraKind::Drawn => (Cameras::Drawn, "drawn cameras (640x480, 55 to 120 deg, pitched, rolled)"),
         };
-        let source = SimulatedPairs { seeds: args.seeds.clone(), spec: ViewSpec::of_robot(n_views), cameras };
+        let pairs = SimulatedPairs { seeds: args.seeds.clone(), spec: ViewSpec::of_robot(n_views), cameras };
+        let (source, depth): (Box<dyn PairSource>, _) = match args.unregistered {
+            true => (Box::new(Unregistered(pairs)), ", depth not registered to colour"),
+            false => (Box::new(pairs), ""),
+        };
         let mut classes = vec![Class::Headline, Class::All];
         classes.extend(Class::by_overlap());
         classes.extend(Class::by_turn());
@@ -172,10 +181,13 @@ impl Task {
         let n_pairs = args.pairs as usize;
         let threads = side_by_side(args.threads)?;
         Ok(Self {
-            source: Box::new(source),
+            source,
             options: MeasureOptions { threads, n_decided: Some(n_pairs) },
             plan: ReportPlan {
-                set: format!("simulated flats from seed {} on, {n_views} views each by {words}", args.seeds.start),
+                set: format!(
+                    "simulated flats from seed {} on, {n_views} views each by {words}{depth}",
+                    args.seeds.start
+                ),
                 classes,
                 compared: vec![Class::Headline],
                 with_switches: true,

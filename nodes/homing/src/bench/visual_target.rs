@@ -9,7 +9,7 @@ use homing_benchmark::visual_target::{
     Difficulty, Options, PairRun, PairRuns, PairSpec, Pipeline, Progress, Report, Solver, TargetPair, bench,
     contact_sheet,
 };
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelName, RunConfig};
+use homing_perception::onnx::FeatureChoice;
 use homing_sim::Viewpoint;
 use homing_sim::views::OVERLAP_MIN;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -125,13 +125,9 @@ fn pipelines(models: &Path) -> Vec<Pipeline> {
 }
 
 fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {
-    let features = FeatureChoice {
-        extractor: ExtractorChoice::resolve(&ModelName::Listed(extractor.to_owned()), models)?,
-        matcher: MatcherChoice::resolve(&ModelName::Listed(matcher.to_owned()), models)?,
-        // Pairs side by side use the cores better than the threads of one.
-        run: RunConfig { threads: 1, ..RunConfig::default() },
-        ..FeatureChoice::default()
-    };
+    let mut features = FeatureChoice::listed(extractor, matcher, models)?;
+    // Pairs side by side use the cores better than the threads of one.
+    features.run.threads = 1;
     if features.uses_models() {
         features.runtime()?;
     }

@@ -38,6 +38,8 @@ pub struct GateSettings {
     pub n_inliers_min: usize,
     /// Largest angular error of a verified match, degrees.
     pub error_deg_max: f64,
+    /// Smallest share of the photo's patches that the frame, drawn from the pose, must look like.
+    pub patch_share_min: f64,
 }
 
 /// `[pose]`.
@@ -98,7 +100,11 @@ impl Default for MemorySettings {
 impl Default for GateSettings {
     fn default() -> Self {
         let gates = PerceptionConfig::default().gates;
-        Self { n_inliers_min: gates.n_inliers_min, error_deg_max: gates.error_rad_max.to_degrees() }
+        Self {
+            n_inliers_min: gates.n_inliers_min,
+            error_deg_max: gates.error_rad_max.to_degrees(),
+            patch_share_min: gates.patch_share_min,
+        }
     }
 }
 
@@ -109,6 +115,7 @@ impl Config {
         config.sift.keypoints_max = self.features.keypoints_max;
         config.ratio_max = self.matcher.ratio_max;
         config.gates.n_inliers_min = self.gates.n_inliers_min;
+        config.gates.patch_share_min = self.gates.patch_share_min;
         // An untouched default keeps its bits: degrees would move the last one.
         if self.gates.error_deg_max != config.gates.error_rad_max.to_degrees() {
             config.gates.error_rad_max = self.gates.error_deg_max.to_radians();

@@ -190,6 +190,23 @@ pub struct Parts {
 }
 
 impl FeatureChoice {
+    /// Two parts with their own settings: the confidence limit is the matcher's.
+    #[must_use]
+    pub fn of(extractor: ExtractorChoice, matcher: MatcherChoice) -> Self {
+        let matcher_config = MatcherConfig { confidence_min: matcher.confidence_min(), ..MatcherConfig::default() };
+        Self { extractor, matcher, matcher_config, ..Self::default() }
+    }
+
+    /// The same, by the names of the manifest in `models`.
+    ///
+    /// # Errors
+    /// [`ChoiceError`] for a name that is none, or a manifest that cannot be read.
+    pub fn listed(extractor: &str, matcher: &str, models: &Path) -> Result<Self, ChoiceError> {
+        let name = |name: &str| ModelName::Listed(name.to_owned());
+        let extractor = ExtractorChoice::resolve(&name(extractor), models)?;
+        Ok(Self::of(extractor, MatcherChoice::resolve(&name(matcher), models)?))
+    }
+
     /// Opens what is chosen. `config` has the settings of SIFT and of the ratio test.
     ///
     /// # Errors

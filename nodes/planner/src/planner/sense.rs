@@ -70,7 +70,7 @@ impl Planner {
         let (step, t_base_camera) = (self.state.step, &observation.t_base_camera);
         let pose = t_odom_base.planar();
         let before = self.filter.best(step).map(|h| h.n_fused);
-        let mut agreed = false;
+        let (mut agreed, mut names_it) = (false, false);
         match &estimate.sighting {
             Sighting::NotSeen { .. } => {}
             Sighting::Bearing { bearing_rad, bearing_sd_rad, n_inliers, .. } => {
@@ -98,6 +98,7 @@ impl Planner {
                 let Some(measured) = measured else { return };
                 let joined = self.filter.join(&measured, step);
                 agreed = joined == Joined::Fused && self.filter.best(step).map(|h| h.n_fused) != before;
+                names_it = joined == Joined::Faint;
                 if matches!(joined, Joined::Fused | Joined::Opened) {
                     let away = libm::atan2(measured.pose.y_m - pose.y_m, measured.pose.x_m - pose.x_m);
                     self.hint(&pose, away, evidence.n_inliers);
@@ -105,7 +106,8 @@ impl Planner {
             }
         }
         self.arrival.hear(estimate.stamp, agreed);
-        if !agreed && !matches!(estimate.sighting, Sighting::Bearing { .. }) && self.doubt(&pose) == Doubt::Refuted {
+        let against = !agreed && !names_it && !matches!(estimate.sighting, Sighting::Bearing { .. });
+        if against && self.doubt(&pose) == Doubt::Refuted {
             self.filter.condemn(step);
             self.arrival.reset();
             self.state.mode = Mode::Explore;

@@ -118,3 +118,53 @@ impl Ledger {
         Ok(all)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
+
+    use super::super::pairs::PairKind;
+    use super::*;
+
+    /// One pair whose cluster tells the unit.
+    fn unit(cluster: u64) -> Measured {
+        let facts = PairFacts {
+            kind: PairKind::Elsewhere,
+            cluster,
+            query: 0,
+            goal: 0,
+            overlap: 0.0,
+            turn_deg: None,
+            distance_m: None,
+            same_state: false,
+            frames_apart: None,
+        };
+        Measured { pairs: vec![facts], findings: vec![vec![Finding::NotSeen]] }
+    }
+
+    fn clusters(measured: &Measured) -> Vec<u64> {
+        measured.pairs.iter().map(|p| p.cluster).collect()
+    }
+
+    #[test]
+    fn units_count_in_their_order_whenever_they_arrive() {
+        let mut ledger = Ledger::new(Some(20));
+        assert!(!ledger.enter(2, Ok(unit(2)), 10), "the first two are missing");
+        assert!(!ledger.enter(1, Ok(unit(1)), 10));
+        assert!(ledger.enter(0, Ok(unit(0)), 10));
+        assert_eq!(clusters(&ledger.close(1).unwrap()), [0, 1], "the third was not needed");
+        let mut all = Ledger::new(None);
+        for i in [1, 0, 2] {
+            assert!(!all.enter(i, Ok(unit(i as u64)), 10));
+        }
+        assert_eq!(clusters(&all.close(1).unwrap()), [0, 1, 2]);
+    }
+
+    #[test]
+    fn a_unit_that_fails_ends_the_run() {
+        let mut ledger = Ledger::new(Some(20));
+        let failed = || Err(RunError::Recording("damaged".into()));
+        assert!(ledger.enter(1, failed(), 0));
+        assert!(ledger.close(1).unwrap_err().to_string().contains("damaged"));
+    }
+}

@@ -46,10 +46,13 @@ impl PairSource for SimulatedPairs {
             let in_view = |p: &&PlannedPair| p.facts.goal_in_view() == Some(true);
             let n_in_view = listed.iter().filter(in_view).count();
             pairs.extend(listed);
-            pairs.extend(unseen_pairs(flat, index(&flats, a), n_in_view.div_ceil(2), &mut rng));
+            let unseen = unseen_pairs(flat, index(&flats, a), n_in_view.div_ceil(2), &mut rng);
+            // A small flat may not have enough views that share nothing: the other flat makes up for it.
+            let n_elsewhere = n_in_view - unseen.len();
+            pairs.extend(unseen);
             if let Some(other) = flats.get(1 - a) {
                 let offsets = (index(&flats, a), index(&flats, 1 - a));
-                pairs.extend(elsewhere_pairs((flat, other), offsets, n_in_view / 2, &mut rng));
+                pairs.extend(elsewhere_pairs((flat, other), offsets, n_elsewhere, &mut rng));
             }
         }
         let frames = flats.into_iter().flat_map(|f| f.views).enumerate().map(|(i, view)| posed(i, view));

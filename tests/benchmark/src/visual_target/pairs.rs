@@ -125,9 +125,9 @@ pub struct PairSpec {
     pub overlap_min: f64,
 }
 
-/// Distances are spread evenly by this share about the mean, either way; the paper states the mean alone. Flats are some
-/// 10 m across: a wider spread asks for views from wall to wall.
-const DISTANCE_SPREAD: f64 = 0.15;
+/// Distances are spread evenly by this share about the mean, either way; the paper states the mean alone, and few flats are
+/// long enough for much more than its greatest.
+const DISTANCE_SPREAD: f64 = 0.1;
 /// Differences of headings likewise.
 const HEADING_SPREAD: f64 = 0.5;
 /// Places tried in one flat.
@@ -135,7 +135,7 @@ const PLACES_MAX: u32 = 20_000;
 /// Pairs of pictures taken in one flat.
 const PICTURES_MAX: u32 = 60;
 /// Flats tried for one pair.
-const FLATS_MAX: u64 = 500;
+const FLATS_MAX: u64 = 200;
 /// Columns of the pictures with which overlaps are tried.
 const TRIAL_WIDTH: u32 = 96;
 
