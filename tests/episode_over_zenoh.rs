@@ -47,7 +47,7 @@ fn in_process(arena: &Arc<Arena>, episode: &Episode) -> (EpisodeRun, Vec<Navigat
     let run = run_episode(
         arena,
         episode,
-        AnyEstimator::open(PerceptionConfig::default(), &FeatureChoice::default()).unwrap(),
+        &mut AnyEstimator::open(PerceptionConfig::default(), &FeatureChoice::default()).unwrap(),
         PlannerConfig::default(),
         Box::new(Frontier::default()),
         &mut |record| states.push(record.state.clone()),

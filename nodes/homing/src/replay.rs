@@ -1,6 +1,6 @@
 //! `homing replay`: real frames through the same topics, processes and perception, compared with the true poses.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
@@ -31,6 +31,10 @@ pub struct ReplayArgs {
     /// Every tenth frame as start, with the goal so many original frames later: one table for each number.
     #[arg(long, value_name = "50,100", value_delimiter = ',')]
     pairs: Vec<u32>,
+    /// Calibration of colour and depth camera, where depth is not registered to the colour: it will be. For 7-Scenes:
+    /// deploy/robot/kinect_v1.toml
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
     #[command(flatten)]
     features: FeatureArgs,
     /// Print the result as JSON.
@@ -89,7 +93,7 @@ struct Stages {
 
 #[tokio::main]
 pub async fn run(args: ReplayArgs) -> anyhow::Result<Ended> {
-    let recording = Recording::open(&args.dir)?;
+    let recording = Recording::open_with(&args.dir, args.rig.as_deref())?;
     let plans = plans(&args, &recording)?;
     let folder = RunFolder::create(&args.out, "replay")?;
     let mut tables = Vec::new();
@@ -180,6 +184,7 @@ async fn play(
 fn start(args: &ReplayArgs, folder: &RunFolder, pairs: &[(u32, u32)], one_goal: bool) -> anyhow::Result<Fleet> {
     let robot = RobotFile {
         recording: args.dir.canonicalize()?,
+        rig: args.rig.as_deref().map(Path::canonicalize).transpose()?,
         frames: pairs.iter().map(|p| p.0).collect(),
         answers: if one_goal { "any_goal" } else { "goal_per_frame" },
         session: Network::listen(&args.endpoint),

@@ -98,6 +98,8 @@ pub struct MonitorFile {
 #[derive(Serialize)]
 pub struct RobotFile {
     pub recording: PathBuf,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rig: Option<PathBuf>,
     pub frames: Vec<u32>,
     pub answers: &'static str,
     pub session: Network,

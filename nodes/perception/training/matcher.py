@@ -103,7 +103,10 @@ class Assignment(NamedTuple):
 
     def log_sums(self) -> tuple[torch.Tensor, torch.Tensor]:
         """Logarithms of the softmaxes' denominators: n x ka over rows, n x kb over columns."""
-        return torch.log(self.weights.sum(2)), torch.log(self.weights.sum(1))
+        # A product with ones: ONNX Runtime takes a sixth of the whole matcher's time to sum columns.
+        ones = torch.ones_like(self.weights[:, :, :1])
+        columns = (ones.transpose(1, 2) @ self.weights)[:, 0]
+        return torch.log(self.weights.sum(2)), torch.log(columns)
 
 
 class Assign(nn.Module):

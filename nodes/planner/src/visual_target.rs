@@ -28,9 +28,14 @@ pub struct MultiStep {
     pub settled_rad: f64,
 }
 
+impl MultiStep {
+    /// The settings that the benchmark runs with.
+    pub const DEFAULT: Self = Self { moves_max: 5, settled_m: 0.05, settled_rad: 0.02 };
+}
+
 impl Default for MultiStep {
     fn default() -> Self {
-        Self { moves_max: 5, settled_m: 0.05, settled_rad: 0.02 }
+        Self::DEFAULT
     }
 }
 
@@ -47,9 +52,14 @@ pub struct UnitStep {
     pub bearing_sd_rad_max: f64,
 }
 
+impl UnitStep {
+    /// The settings that the benchmark runs with.
+    pub const DEFAULT: Self = Self { moves_max: 25, step_m: 1.0, step_m_min: 0.1, bearing_sd_rad_max: 0.5 };
+}
+
 impl Default for UnitStep {
     fn default() -> Self {
-        Self { moves_max: 25, step_m: 1.0, step_m_min: 0.1, bearing_sd_rad_max: 0.5 }
+        Self::DEFAULT
     }
 }
 

@@ -73,6 +73,37 @@ fn reads_seven_scenes() {
 }
 
 #[test]
+fn a_rig_makes_poses_and_intrinsics_those_of_the_colour_camera() {
+    let folder = seven_scenes(&[0, 10]);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/robot/kinect_v1.toml");
+    let recording = Recording::open_with(folder.path(), Some(&file)).unwrap();
+    assert_eq!(recording.intrinsics().fx(), 525.0);
+    // Colour lies to the left in the depth camera's view of it, by the calibration's 2.5 cm.
+    let p = recording.t_world_camera(10).unwrap().translation();
+    assert!((p.x - 1.0 - 0.0255).abs() < 1e-3 && p.y.abs() < 1e-3, "{p}");
+    // Between two frames the camera moved as the depth camera did, but for the bar it turns on.
+    let moved = recording.relative_pose_truth(0, 10).unwrap();
+    assert!((moved.translation().norm() - 1.0).abs() < 1e-9 && moved.rotation().angle() < 1e-6);
+    // A wall 1.5 m away is there for the colour camera, too, where the depth camera saw it: not at the picture's rim.
+    let frame = recording.frame(10).unwrap();
+    let centre = f64::from(frame.depth.at(320, 240).unwrap());
+    assert!((centre - 1.5).abs() < 0.01, "{centre}");
+    assert_eq!(frame.depth.at(2, 240), None);
+    assert!(frame.depth.valid_share() > 0.75);
+}
+
+#[test]
+fn a_rig_of_other_cameras_or_none_is_refused() {
+    let folder = open3d(1);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/robot/kinect_v1.toml");
+    let error = Recording::open_with(folder.path(), Some(&file)).unwrap_err();
+    assert!(matches!(error, RecordingError::Rig { found: (8, 6), expected: (640, 480), .. }), "{error}");
+    says(&Recording::open_with(folder.path(), Some(&folder.path().join("none.toml"))).unwrap_err(), "none.toml");
+    let other = folder.path().join("trajectory.log");
+    says(&Recording::open_with(folder.path(), Some(&other)).unwrap_err(), "kinect_v1.toml is an example");
+}
+
+#[test]
 fn reads_open3d() {
     let folder = open3d(3);
     let recording = Recording::open(folder.path()).unwrap();

@@ -48,10 +48,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     } else {
         FeatureChoice::default()
     };
-    let estimator = AnyEstimator::open(perception, &features)?;
+    let mut estimator = AnyEstimator::open(perception, &features)?;
     let mut marks = Vec::new();
     let mut map = None;
-    let run = run_episode(&arena, &episode, estimator, PlannerConfig::default(), policy.build(), &mut |r| {
+    let run = run_episode(&arena, &episode, &mut estimator, PlannerConfig::default(), policy.build(), &mut |r| {
         print_step(&arena, &episode, r);
         let sighted = sighted_pose(r).zip(right_pose(r));
         if has("frames") || (has("wrong") && sighted.is_some_and(|(_, right)| !right)) {

@@ -115,7 +115,7 @@ fn run_seed(seed: u64, options: &BenchOptions) -> Result<(EpisodeRow, StageSecon
     let run = run_episode(
         &arena,
         &episode,
-        AnyEstimator::open(perception, &options.features)?,
+        &mut AnyEstimator::open(perception, &options.features)?,
         options.planner.clone(),
         options.policy.build(),
         &mut |record| watch.see(&arena, &episode, record),

@@ -74,14 +74,14 @@ pub struct EpisodeRun {
 /// Runs one episode to its end: the goal is declared reached, given up, or the planner's step budget is spent.
 ///
 /// Each step waits for everything that belongs to it, perception's answer included, as the nodes do in lockstep.
-/// `observer` is called once a step, after the decision and before the motion.
+/// `observer` is called once a step, after the decision and before the motion. `estimator` is given the goal's photo.
 ///
 /// # Errors
 /// [`RunError`] when a part cannot be set up or fails.
 pub fn run_episode(
     arena: &Arc<Arena>,
     episode: &Episode,
-    estimator: AnyEstimator,
+    estimator: &mut AnyEstimator,
     planner: PlannerConfig,
     discovery: Box<dyn GoalDiscovery>,
     observer: &mut dyn FnMut(&StepRecord<'_>),
@@ -92,9 +92,9 @@ pub fn run_episode(
 }
 
 /// Body, perception and planner between two steps.
-struct Lockstep {
+struct Lockstep<'a> {
     robot: Simulator,
-    estimator: AnyEstimator,
+    estimator: &'a mut AnyEstimator,
     planner: Planner,
     config: PlannerConfig,
     goal_odom_truth: PlanarPose,
@@ -104,11 +104,11 @@ struct Lockstep {
     times: StageSeconds,
 }
 
-impl Lockstep {
+impl<'a> Lockstep<'a> {
     fn new(
         arena: &Arc<Arena>,
         episode: &Episode,
-        mut estimator: AnyEstimator,
+        estimator: &'a mut AnyEstimator,
         config: PlannerConfig,
         discovery: Box<dyn GoalDiscovery>,
     ) -> Result<Self, RunError> {

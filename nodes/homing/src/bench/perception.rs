@@ -46,6 +46,10 @@ pub struct PerceptionArgs {
     /// Measure on this recording instead of on flats: a folder in 7-Scenes or Open3D layout.
     #[arg(long, value_name = "DIR")]
     rgbd: Option<PathBuf>,
+    /// Calibration of the recording's colour and depth cameras, where depth is not registered to the colour: it will be. For
+    /// 7-Scenes: deploy/robot/kinect_v1.toml
+    #[arg(long, value_name = "FILE", requires = "rgbd")]
+    rig: Option<PathBuf>,
     /// Of a recording: every tenth frame as start, with the goal so many original frames later.
     #[arg(long, value_name = "50,100", value_delimiter = ',', default_value = "50,100")]
     gaps: Vec<u32>,
@@ -200,7 +204,8 @@ impl Task {
     fn recorded(args: &PerceptionArgs, folder: &Path) -> anyhow::Result<Self> {
         /// Start frames are this many original frames apart, as in `homing replay`.
         const STRIDE: u32 = 10;
-        let source = RecordedPairs::new(Recording::open(folder)?, &args.gaps, STRIDE);
+        let recording = Recording::open_with(folder, args.rig.as_deref())?;
+        let source = RecordedPairs::new(recording, &args.gaps, STRIDE);
         let n_pairs = source.len();
         let gaps: Vec<Class> = args.gaps.iter().map(|&frames| Class::Apart(frames)).collect();
         let mut classes = gaps.clone();
@@ -212,7 +217,11 @@ impl Task {
             source: Box::new(source),
             options: MeasureOptions { threads, n_decided: None },
             plan: ReportPlan {
-                set: format!("recorded frames in {}", folder.display()),
+                set: format!(
+                    "recorded frames in {}{}",
+                    folder.display(),
+                    if args.rig.is_some() { ", depth registered to the colour" } else { "" }
+                ),
                 classes,
                 compared: gaps,
                 with_switches: false,

@@ -14,6 +14,9 @@ pub struct Config {
     pub session: SessionSettings,
     /// Folder of the recording to play.
     pub recording: PathBuf,
+    /// Calibration of colour and depth camera, where depth is not registered to the colour: it will be.
+    #[serde(default)]
+    pub rig: Option<PathBuf>,
     /// Frames to play, by their numbers in the recording; empty means all.
     #[serde(default)]
     pub frames: Vec<u32>,

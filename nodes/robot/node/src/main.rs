@@ -28,7 +28,7 @@ fn main() -> ExitCode {
 async fn run(config: Config) -> anyhow::Result<()> {
     let stop = process::termination()?;
     let session = Session::open(&config.session.body())?;
-    let recording = Recording::open(&config.recording)?;
+    let recording = Recording::open_with(&config.recording, config.rig.as_deref())?;
     let frames = if config.frames.is_empty() { recording.numbers().collect() } else { config.frames };
     let body = ReplayBody::with_playlist(recording, frames)?;
     tokio::select! {

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::depth_rig::DepthRigError;
+
 /// Why a recording, or one frame of it, cannot be used.
 #[derive(Debug, Error)]
 pub enum RecordingError {
@@ -82,6 +84,22 @@ pub enum RecordingError {
         /// Its columns and rows, by its header.
         found: (u32, u32),
         /// Columns and rows of the intrinsics.
+        expected: (u32, u32),
+    },
+    /// A rig's file that cannot be used.
+    #[error(transparent)]
+    NoRig(#[from] DepthRigError),
+    /// A rig of other cameras.
+    #[error(
+        "{}: depth images of {}x{} pixels, but the rig's depth camera has {}x{}; give the rig of the cameras that recorded",
+        directory.display(), found.0, found.1, expected.0, expected.1
+    )]
+    Rig {
+        /// The folder.
+        directory: PathBuf,
+        /// Columns and rows of the depth images.
+        found: (u32, u32),
+        /// Columns and rows of the rig's depth camera.
         expected: (u32, u32),
     },
     /// A depth image is not one.

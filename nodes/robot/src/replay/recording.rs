@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use homing_core::{Camera, Frame, Goal, Intrinsics, RgbdFrame, Stamp, Transform};
+use homing_core::{Camera, DepthImage, Frame, Goal, Intrinsics, RgbdFrame, Stamp, Transform};
 
 use super::error::RecordingError;
 use super::{decode, open3d, seven_scenes};
+use crate::depth_rig::{DepthCamera, DepthRig};
 
 /// The frame in which a recording's camera poses are given. Which way is up in it is not known.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -20,7 +21,7 @@ impl Frame for World {
 /// How a recording is laid out on disk.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// Microsoft 7-Scenes. Depth is not registered to colour; both are treated as the depth camera's image.
+    /// Microsoft 7-Scenes. Depth is not registered to colour; without a rig both are treated as the depth camera's image.
     SevenScenes,
     /// Open3D's reconstruction system.
     Open3d,
@@ -33,6 +34,8 @@ pub struct Recording {
     layout: Layout,
     intrinsics: Intrinsics,
     entries: BTreeMap<u32, Entry>,
+    /// Where depth was taken by a camera of its own.
+    rig: Option<DepthRig>,
 }
 
 /// One frame on disk.
@@ -68,7 +71,42 @@ impl Recording {
         if entries.is_empty() {
             return Err(RecordingError::NoFrames { directory });
         }
-        Ok(Self { directory, layout, intrinsics, entries })
+        Ok(Self { directory, layout, intrinsics, entries, rig: None })
+    }
+
+    /// Opens a recording; with a rig's file its depth is registered to the colour.
+    ///
+    /// # Errors
+    /// As [`Self::open`], [`DepthRig::read`] and [`Self::with_rig`].
+    pub fn open_with(directory: impl AsRef<Path>, rig: Option<&Path>) -> Result<Self, RecordingError> {
+        let recording = Self::open(directory)?;
+        match rig {
+            None => Ok(recording),
+            Some(file) => recording.with_rig(DepthRig::read(file)?),
+        }
+    }
+
+    /// The same recording, of which it is known that a camera beside the colour camera took the depth: depth is registered
+    /// to the colour, the intrinsics are the colour camera's, and recorded poses, the depth camera's, become its own.
+    ///
+    /// # Errors
+    /// [`RecordingError::Rig`] when the depth images are of another size than the rig's.
+    pub fn with_rig(mut self, rig: DepthRig) -> Result<Self, RecordingError> {
+        let size = |camera: &Intrinsics| (camera.width(), camera.height());
+        if size(&rig.depth) != size(&self.intrinsics) {
+            return Err(RecordingError::Rig {
+                directory: self.directory,
+                found: size(&self.intrinsics),
+                expected: size(&rig.depth),
+            });
+        }
+        for entry in self.entries.values_mut() {
+            let t_world_depth: Transform<World, DepthCamera> = Transform::new(*entry.t_world_camera.isometry());
+            entry.t_world_camera = t_world_depth * rig.t_camera_depth.inverse();
+        }
+        self.intrinsics = rig.colour;
+        self.rig = Some(rig);
+        Ok(self)
     }
 
     /// Where it lies.
@@ -121,7 +159,10 @@ impl Recording {
         let entry = self.entry(number)?;
         let size = (self.intrinsics.width(), self.intrinsics.height());
         let rgb = Arc::new(decode::colour(&entry.colour, size)?);
-        let depth = Arc::new(decode::depth(&entry.depth, size)?);
+        let depth = Arc::new(match &self.rig {
+            None => decode::depth(&entry.depth, size)?,
+            Some(rig) => self.registered(rig, &entry.depth)?,
+        });
         // Both were checked to have this size.
         Ok(RgbdFrame { stamp: Self::stamp(number), rgb, depth, intrinsics: self.intrinsics })
     }
@@ -153,6 +194,16 @@ impl Recording {
         let starts = self.numbers().filter(|query| (query - first) % stride.max(1) == 0);
         let pair = |query: u32| Some((query, query.checked_add(gap)?));
         starts.filter_map(pair).filter(|(_, goal)| self.entries.contains_key(goal)).collect()
+    }
+
+    fn registered(&self, rig: &DepthRig, file: &Path) -> Result<DepthImage, RecordingError> {
+        let expected = (rig.depth.width(), rig.depth.height());
+        let depth = decode::depth(file, expected)?;
+        rig.register(&depth).map_err(|_| RecordingError::Rig {
+            directory: self.directory.clone(),
+            found: (depth.width(), depth.height()),
+            expected,
+        })
     }
 
     fn entry(&self, number: u32) -> Result<&Entry, RecordingError> {

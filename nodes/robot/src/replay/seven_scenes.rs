@@ -3,7 +3,7 @@
 //!
 //! Depth was taken by a second lens and is NOT registered to the colour. Both are treated as one camera with the depth
 //! camera's intrinsics (f = 585, c = (320, 240) at 640x480), as is usual with this set; the colour lens's focal length is
-//! nearer 525, which is part of the errors measured on it.
+//! nearer 525, which is part of the errors measured on it. [`super::Recording::with_rig`] takes the difference out.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -128,7 +128,7 @@ fn comparison_row(f: &mut fmt::Formatter<'_>, c: &Comparison) -> fmt::Result {
     let d = &c.difference;
     writeln!(
         f,
-        "  {:30}{:34}{:16}{:+.3} ({:+.3} to {:+.3})  only the one {}, only the other {}, of {}; p {:.4}",
+        "  {:40} {:33} {:15} {:+.3} ({:+.3} to {:+.3})  only the one {}, only the other {}, of {}; p {:.4}",
         c.other,
         c.class,
         c.tolerance.words(),

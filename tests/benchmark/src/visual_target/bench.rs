@@ -7,7 +7,7 @@ use homing_core::GoalPhoto;
 use homing_perception::{AnyEstimator, PerceptionError};
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 
-use super::methods::{Pipeline, ways};
+use super::methods::Pipeline;
 use super::pairs::{PairSpec, TargetPair, draw_pair, plan, view};
 use super::report::Report;
 use super::run::{PairRun, Robot};
@@ -18,7 +18,7 @@ use crate::RunError;
 pub struct Options {
     /// The pairs.
     pub pairs: PairSpec,
-    /// Configurations of perception; each is run in all [`ways`].
+    /// Configurations of perception; each is run in all of its [`Pipeline::ways`].
     pub pipelines: Vec<Pipeline>,
     /// Pairs at a time; 0 for one per core.
     pub threads: usize,
@@ -106,15 +106,15 @@ fn side_by_side<Item: Sync, Tools: Send, Done: Send>(
 }
 
 fn run_pair(pair: &TargetPair, options: &Options, estimators: &mut [AnyEstimator]) -> Result<Vec<PairRun>, RunError> {
-    let arena = Arena::load(&SceneRef::Flat { seed: pair.flat }, BodySize::default())?;
+    let arena = Arc::new(Arena::load(&SceneRef::Flat { seed: pair.flat }, BodySize::default())?);
     let photo = view(&arena, &options.pairs.camera, pair.target)?;
     let rgb = Arc::new(photo.rgb);
     let mut runs = Vec::new();
-    for estimator in estimators {
+    for (pipeline, estimator) in options.pipelines.iter().zip(estimators) {
         estimator.set_goal(GoalPhoto { id: 1, rgb: Arc::clone(&rgb), intrinsics: photo.camera })?;
         let mut robot = Robot::new(&arena, options.pairs.camera, estimator);
-        for way in ways() {
-            runs.push(robot.run(pair, &way)?);
+        for way in pipeline.ways() {
+            runs.push(robot.run(pair, way)?);
         }
     }
     Ok(runs)

@@ -38,18 +38,24 @@ pub struct Way {
     /// What the camera delivers.
     pub sensor: Sensor,
     /// How sightings become motions.
-    pub approach: Approach,
+    pub guide: Guide,
 }
 
-/// One step (paper, 2.3 and 3.2), multi-step, and colour alone in unit steps.
-#[must_use]
-pub fn ways() -> [Way; 3] {
-    [
-        Way { name: "one step", sensor: Sensor::RgbD, approach: Approach::OneStep },
-        Way { name: "multi-step", sensor: Sensor::RgbD, approach: Approach::MultiStep(MultiStep::default()) },
-        Way { name: "RGB, unit steps", sensor: Sensor::Rgb, approach: Approach::UnitStep(UnitStep::default()) },
-    ]
+/// What turns sightings into motions.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub enum Guide {
+    /// The paper's own: straight to where the target was seen; what is not seen is not reached.
+    Approach(Approach),
+    /// The whole planner, as in `homing bench`: map, search, approach, stop.
+    Planner,
 }
+
+const ONE_STEP: Way = Way { name: "one step", sensor: Sensor::RgbD, guide: Guide::Approach(Approach::OneStep) };
+const MULTI_STEP: Way =
+    Way { name: "multi-step", sensor: Sensor::RgbD, guide: Guide::Approach(Approach::MultiStep(MultiStep::DEFAULT)) };
+const UNIT_STEPS: Way =
+    Way { name: "RGB, unit steps", sensor: Sensor::Rgb, guide: Guide::Approach(Approach::UnitStep(UnitStep::DEFAULT)) };
+const PLANNER: Way = Way { name: "with map and search", sensor: Sensor::RgbD, guide: Guide::Planner };
 
 /// One configuration of perception.
 #[derive(Clone, Debug)]
@@ -60,9 +66,18 @@ pub struct Pipeline {
     pub features: FeatureChoice,
     /// What makes a pose of matches.
     pub solver: Solver,
+    /// Is the whole planner tried with it, too? Minutes a pair where the target is not found.
+    pub planner: bool,
 }
 
 impl Pipeline {
+    /// One step (paper, 2.3 and 3.2), multi-step, colour alone in unit steps, and the planner where it is asked for.
+    #[must_use]
+    pub fn ways(&self) -> &'static [Way] {
+        const ALL: [Way; 4] = [ONE_STEP, MULTI_STEP, UNIT_STEPS, PLANNER];
+        if self.planner { &ALL } else { &ALL[..3] }
+    }
+
     /// # Errors
     /// As [`AnyEstimator::open`].
     pub fn open(&self) -> Result<AnyEstimator, PerceptionError> {

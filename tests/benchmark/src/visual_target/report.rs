@@ -7,7 +7,7 @@ use homing_planner::visual_target::{MultiStep, UnitStep};
 use serde::{Deserialize, Serialize};
 
 use super::bench::{Options, PairRuns};
-use super::methods::ways;
+use super::methods::Guide;
 use super::pairs::{Difficulty, Published, TargetPair};
 use super::run::{Finding, PairRun, Sensor};
 use crate::report::wilson_95;
@@ -86,7 +86,7 @@ pub struct Cell {
     pub success_distance_m_median: Option<f64>,
     /// Median difference of headings at the end of the successes, degrees.
     pub success_heading_deg_median: Option<f64>,
-    /// What lost the failures.
+    /// What lost the failures; nothing where the first look does not decide.
     pub losses: BTreeMap<Loss, usize>,
 }
 
@@ -144,7 +144,7 @@ impl Report {
     pub fn new(options: &Options, runs: Vec<PairRuns>) -> Self {
         let camera = &options.pairs.camera;
         let pairs: Vec<TargetPair> = runs.iter().map(|(pair, _)| *pair).collect();
-        let rows = options.pipelines.iter().flat_map(|pipeline| ways().map(|way| (pipeline, way)));
+        let rows = options.pipelines.iter().flat_map(|pipeline| pipeline.ways().iter().map(move |way| (pipeline, way)));
         let methods = rows.enumerate().map(|(k, (pipeline, way))| {
             let of_method: Vec<(&TargetPair, &PairRun)> = runs.iter().map(|(pair, runs)| (pair, &runs[k])).collect();
             MethodReport {
@@ -152,7 +152,7 @@ impl Report {
                 features: format!("{} + {}", pipeline.features.extractor.name(), pipeline.features.matcher.name()),
                 solver: format!("{:?}", pipeline.solver),
                 sensor: way.sensor,
-                cells: Difficulty::ALL.map(|d| Cell::of(d, &of_method)).to_vec(),
+                cells: Difficulty::ALL.map(|d| Cell::of(d, &of_method, way.guide != Guide::Planner)).to_vec(),
                 runs: of_method.iter().map(|(_, run)| (*run).clone()).collect(),
             }
         });
@@ -193,14 +193,15 @@ impl Column {
 }
 
 impl Cell {
-    fn of(difficulty: Difficulty, runs: &[(&TargetPair, &PairRun)]) -> Self {
+    /// `lost_at_once`: the first look decides what loses a pair.
+    fn of(difficulty: Difficulty, runs: &[(&TargetPair, &PairRun)], lost_at_once: bool) -> Self {
         let runs: Vec<_> = runs.iter().filter(|(pair, _)| pair.difficulty == difficulty).collect();
         let won: Vec<&PairRun> = runs.iter().map(|(_, run)| *run).filter(|run| run.success).collect();
         let masked = |run: fn(&PairRun) -> f64, pair: fn(&TargetPair) -> f64| {
             mean(runs.iter().map(|(p, r)| if r.success { run(r) } else { pair(p) }))
         };
         let mut losses = BTreeMap::new();
-        for loss in runs.iter().filter_map(|(_, run)| Loss::of(run)) {
+        for loss in runs.iter().filter(|_| lost_at_once).filter_map(|(_, run)| Loss::of(run)) {
             *losses.entry(loss).or_insert(0) += 1;
         }
         Self {
@@ -268,7 +269,7 @@ impl fmt::Display for Report {
             line(f, &format!("  {}", method.name), method.cells.iter().map(of).collect())?;
         }
         writeln!(f, "\nwhat lost the others, by the first look")?;
-        for method in &self.methods {
+        for method in self.methods.iter().filter(|m| m.cells.iter().any(|c| !c.losses.is_empty())) {
             let of = |c: &Cell| {
                 c.losses.iter().map(|(loss, n)| format!("{n} {}", loss.words())).collect::<Vec<_>>().join(", ")
             };
@@ -298,7 +299,7 @@ impl Report {
              and target stand free; nothing else was asked of a pair. One step: the robot is put at the estimated pose,\n\
              or at the nearest free place on the straight way there. Multi-step: up to {} times, until a correction is\n\
              below {} m and {:.0} deg. Unit steps of {} m, halved when the direction turns around, until {} m or until\n\
-             parallax is too small to tell a direction.",
+             parallax is too small to tell a direction. With map and search: the planner drives, as in `homing bench`.",
             self.hfov_deg,
             100.0 * self.overlap_min,
             multi.moves_max,
@@ -342,7 +343,8 @@ mod tests {
     #[test]
     fn failures_count_with_their_initial_errors_and_their_cause() {
         let pairs = PairSpec { n_each: 2, seed: 1, camera: Viewpoint::default(), overlap_min: 0.1 };
-        let pipeline = Pipeline { name: "SIFT".to_owned(), features: Default::default(), solver: Solver::Ours };
+        let (features, solver) = (Default::default(), Solver::Ours);
+        let pipeline = Pipeline { name: "SIFT".to_owned(), features, solver, planner: false };
         let options = Options { pairs, pipelines: vec![pipeline], threads: 1 };
         let good = run(0.1, Finding::Pose, Some(0.1));
         let wrong = run(3.0, Finding::Pose, Some(4.0));

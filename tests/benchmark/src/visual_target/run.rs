@@ -3,17 +3,21 @@
 use std::sync::Arc;
 
 use homing_core::{
-    Base, DepthImage, GoalEstimate, Odom, PlanarPose, RgbImage, RgbdFrame, Sighting, Stamp, Transform, UnseenReason,
+    Base, DepthImage, GoalEstimate, Mode, Odom, PlanarPose, RgbImage, RgbdFrame, Sighting, Stamp, Transform, UnseenReason,
     wrap_angle,
 };
 use homing_perception::AnyEstimator;
-use homing_planner::visual_target::{Decision, Ending, Look, Refinement};
+use homing_planner::PlannerConfig;
+use homing_planner::visual_target::{Approach, Decision, Ending, Look, Refinement};
 use homing_sim::arena::Arena;
-use homing_sim::episode::{FloorPose, Viewpoint};
+use homing_sim::episode::{Episode, FloorPose, Shape, Viewpoint};
+use homing_sim::geodesic::GeodesicField;
 use serde::{Deserialize, Serialize};
 
-use super::methods::Way;
+use super::methods::{Guide, Way};
 use super::pairs::{TargetPair, view};
+use crate::bench::Policy;
+use crate::episode::{StepRecord, run_episode};
 use crate::RunError;
 
 /// Success is ending nearer to the target than this, metres (paper, 3.2), ...
@@ -81,13 +85,21 @@ pub struct PairRun {
     pub ending: String,
     /// Where it ended.
     pub end: FloorPose,
-    /// Every look, the first from the start.
+    /// Every look, the first from the start; of a run with the planner, that of every step.
     pub looks: Vec<LookRecord>,
+}
+
+impl PairRun {
+    fn new(pair: &TargetPair, end: FloorPose, ending: String, looks: Vec<LookRecord>) -> Self {
+        let (final_distance_m, final_heading_deg) = off(end.into(), pair.target);
+        let success = final_distance_m < SUCCESS_M && final_heading_deg < SUCCESS_DEG;
+        Self { success, final_distance_m, final_heading_deg, ending, end, looks }
+    }
 }
 
 /// A robot with a target view in mind.
 pub struct Robot<'a> {
-    arena: &'a Arena,
+    arena: &'a Arc<Arena>,
     camera: Viewpoint,
     estimator: &'a mut AnyEstimator,
     /// What was seen from where: ways that begin alike look alike.
@@ -96,21 +108,29 @@ pub struct Robot<'a> {
 
 impl<'a> Robot<'a> {
     /// `estimator` knows the target view.
-    pub fn new(arena: &'a Arena, camera: Viewpoint, estimator: &'a mut AnyEstimator) -> Self {
+    pub fn new(arena: &'a Arc<Arena>, camera: Viewpoint, estimator: &'a mut AnyEstimator) -> Self {
         Self { arena, camera, estimator, seen: Vec::new() }
     }
 
-    /// Goes from a pair's start towards its target. The body is put where a motion leads; where it cannot stand, at the
-    /// nearest place on the straight way there at which it can.
+    /// Goes from a pair's start towards its target.
     ///
     /// # Errors
     /// [`RunError`] when a part fails; a target that is not reached is none.
     pub fn run(&mut self, pair: &TargetPair, way: &Way) -> Result<PairRun, RunError> {
-        let mut refinement = Refinement::new(way.approach);
+        match way.guide {
+            Guide::Approach(approach) => self.approach(pair, approach, way.sensor),
+            Guide::Planner => self.plan(pair),
+        }
+    }
+
+    /// The body is put where a motion leads; where it cannot stand, at the nearest place on the straight way there at
+    /// which it can.
+    fn approach(&mut self, pair: &TargetPair, approach: Approach, sensor: Sensor) -> Result<PairRun, RunError> {
+        let mut refinement = Refinement::new(approach);
         let mut here = pair.start;
         let mut looks = Vec::new();
         let ending = loop {
-            let estimate = self.look(here, way.sensor)?;
+            let estimate = self.look(here, sensor)?;
             // The world's frame serves as the odometry's: no decision depends on which it is.
             let t_odom_base: Transform<Odom, Base> = PlanarPose::from(here).to_transform();
             let t_base_camera = self.camera.t_base_camera();
@@ -121,15 +141,36 @@ impl<'a> Robot<'a> {
                 Decision::Done(ending) => break ending,
             }
         };
-        let (final_distance_m, final_heading_deg) = off(here.into(), pair.target);
-        Ok(PairRun {
-            success: final_distance_m < SUCCESS_M && final_heading_deg < SUCCESS_DEG,
-            final_distance_m,
-            final_heading_deg,
-            ending: words(ending).to_owned(),
-            end: here,
-            looks,
-        })
+        Ok(PairRun::new(pair, here, words(ending).to_owned(), looks))
+    }
+
+    /// The body drives, step by step, within the planner's budget.
+    fn plan(&mut self, pair: &TargetPair) -> Result<PairRun, RunError> {
+        let at = |p: FloorPose| (p.x_m, p.y_m);
+        let way = GeodesicField::to(self.arena.space(), at(pair.target)).ok();
+        let way_m = way.and_then(|field| field.distance_m(pair.start.x_m, pair.start.y_m));
+        let episode = Episode {
+            scene: self.arena.scene_ref().clone(),
+            seed: pair.flat,
+            start: pair.start,
+            goal: pair.target,
+            camera: self.camera,
+            shortest_path_m: way_m.unwrap_or_else(|| pair.distance_m()),
+            shape: Shape::Curved,
+        };
+        let (mut end, mut looks) = (pair.start, Vec::new());
+        let mut follow = |step: &StepRecord<'_>| {
+            end = FloorPose { x_m: step.pose_truth.x_m, y_m: step.pose_truth.y_m, yaw_rad: step.pose_truth.yaw_rad };
+            let (t_base_camera, sighting) = (step.t_base_camera, &step.estimate.sighting);
+            let look = Look { t_odom_base: step.pose_truth.to_transform(), t_base_camera, sighting };
+            looks.push(record(&look, step.estimate.n_matches, end, pair.target));
+        };
+        let (config, policy) = (PlannerConfig::default(), Policy::Frontier.build());
+        let run = run_episode(self.arena, &episode, self.estimator, config, policy, &mut follow)?;
+        // A robot that stands there without knowing has not arrived.
+        let arrived = run.mode == Mode::Arrived;
+        let ended = PairRun::new(pair, end, run.reason, looks);
+        Ok(PairRun { success: ended.success && arrived, ..ended })
     }
 
     fn look(&mut self, at: FloorPose, sensor: Sensor) -> Result<GoalEstimate, RunError> {
