@@ -16,6 +16,7 @@ use homing_sim::geodesic::GeodesicField;
 use homing_sim::{Arena, Episode, Finish, Score};
 use homing_tests::mission::{Mission, flat, photo};
 use homing_tests::processes::System;
+use homing_tests::repository;
 
 /// Takes about sixty steps, through discovery, approach and turning to the goal's heading.
 const SEED: u64 = 1001;
@@ -44,10 +45,13 @@ async fn an_episode_over_zenoh_is_the_episode_in_process() {
 
 fn in_process(arena: &Arc<Arena>, episode: &Episode) -> (EpisodeRun, Vec<NavigationState>) {
     let mut states = Vec::new();
+    let models = repository().join("nodes/perception/models");
+    let features = FeatureChoice::listed("homing", None, &models).unwrap();
+    let mut estimator = AnyEstimator::open(PerceptionConfig::default(), &features).unwrap();
     let run = run_episode(
         arena,
         episode,
-        &mut AnyEstimator::open(PerceptionConfig::default(), &FeatureChoice::default()).unwrap(),
+        &mut estimator,
         PlannerConfig::default(),
         Box::new(Frontier::default()),
         &mut |record| states.push(record.state.clone()),
@@ -57,17 +61,11 @@ fn in_process(arena: &Arc<Arena>, episode: &Episode) -> (EpisodeRun, Vec<Navigat
 
 async fn over_zenoh(arena: &Arena, episode: &Episode) -> (MissionReport, Vec<NavigationState>, GroundTruth) {
     let system = System::new();
-    let file = system.file("episode.json", serde_json::to_string(episode).unwrap());
-    let mut body = system.body(&format!("episode = {file:?}"));
-    body.says("the body is ready");
-    let mut perception = system.node("homing-perception", "");
-    perception.says("perception is ready");
-    let mut planner = system.node("homing-planner", "");
-    planner.says("planner is ready");
+    let everybody = system.everybody(episode, "");
     let session = system.session();
     let mission = Mission::begin(&session, &photo(arena, episode)).await;
     let end = mission.end(Duration::from_secs(150)).await;
-    assert!(!planner.said().contains("WARN"), "something was lost or late: {}", planner.said());
+    assert!(!everybody.planner.said().contains("WARN"), "something was lost or late: {}", everybody.planner.said());
     session.close();
     end
 }

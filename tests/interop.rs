@@ -56,13 +56,7 @@ async fn a_python_client_reads_the_system_and_drives_the_robot() {
     let Some(python) = python() else { return };
     let (arena, episode) = flat(1005);
     let system = System::new();
-    let file = system.file("episode.json", serde_json::to_string(&episode).unwrap());
-    let mut body = system.body(&format!("pace = \"real_time\"\nepisode = {file:?}"));
-    body.says("the body is ready");
-    let mut perception = system.node("homing-perception", "");
-    perception.says("perception is ready");
-    let mut planner = system.node("homing-planner", "");
-    planner.says("planner is ready");
+    let mut everybody = system.everybody(&episode, "pace = \"real_time\"");
     let session = system.session();
     let (images, estimates) = (hear_images(&session), hear_estimates(&session));
     let mission = Mission::begin(&session, &photo(&arena, &episode)).await;
@@ -82,8 +76,8 @@ async fn a_python_client_reads_the_system_and_drives_the_robot() {
 
     // No planner, no lease: the client's word counts.
     drop(mission);
-    planner.signal(Signal::SIGTERM);
-    assert_eq!(planner.ends().code(), Some(0));
+    everybody.planner.signal(Signal::SIGTERM);
+    assert_eq!(everybody.planner.ends().code(), Some(0));
     let driven = tokio::task::block_in_place(|| client(&python, &system, "drive"));
     assert!(driven["turned_rad"].as_f64().unwrap() >= 0.6, "{driven}");
     assert_eq!(driven["turning_after_silence_rad_s"], 0.0, "{driven}");

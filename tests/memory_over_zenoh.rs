@@ -16,13 +16,7 @@ const SEED: u64 = 1001;
 async fn a_photo_of_a_place_that_was_passed_is_driven_to_without_a_search() {
     let (arena, episode) = flat(SEED);
     let system = System::new();
-    let file = system.file("episode.json", serde_json::to_string(&episode).unwrap());
-    let mut body = system.body(&format!("episode = {file:?}"));
-    body.says("the body is ready");
-    let mut perception = system.node("homing-perception", "");
-    perception.says("perception is ready");
-    let mut planner = system.node("homing-planner", "");
-    planner.says("planner is ready");
+    let everybody = system.everybody(&episode, "");
     let session = system.session();
     let first = Mission::begin(&session, &photo(&arena, &episode)).await;
     let (report, _, _) = first.end(Duration::from_secs(150)).await;
@@ -36,7 +30,7 @@ async fn a_photo_of_a_place_that_was_passed_is_driven_to_without_a_search() {
     let goal = state.goal.clone().unwrap().pose;
     assert!(goal.distance_to(0.0, 0.0) < 0.3 && goal.yaw_rad.abs() < 0.1, "{goal:?}");
     assert_eq!(state.mode, Mode::Exploit, "{}", state.reason);
-    assert!(perception.said().contains("seen before: the goal in"), "{}", perception.said());
+    assert!(everybody.perception.said().contains("seen before: the goal in"), "{}", everybody.perception.said());
     let (report, _, truth) = second.end(Duration::from_secs(150)).await;
     assert_eq!(report.outcome, Outcome::Arrived, "{}", report.message);
     let start = episode.start;

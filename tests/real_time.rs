@@ -201,20 +201,14 @@ async fn a_perception_slower_than_the_camera_holds_nobody_up() {
     const STEPS: u64 = 12;
     let (arena, episode) = flat(1005);
     let system = System::new();
-    let file = system.file("episode.json", serde_json::to_string(&episode).unwrap());
-    let mut body = system.body(&format!("pace = \"real_time\"\nframe_rate_hz = 30.0\nepisode = {file:?}"));
-    body.says("the body is ready");
-    let mut perception = system.node("homing-perception", "");
-    perception.says("perception is ready");
-    let mut planner = system.node("homing-planner", "");
-    planner.says("planner is ready");
+    let everybody = system.everybody(&episode, "pace = \"real_time\"\nframe_rate_hz = 30.0");
     let session = system.session();
     let mission = Mission::begin(&session, &photo(&arena, &episode)).await;
     let began = Instant::now();
     let state = mission.state_where(100, |s| s.step == STEPS).await;
     assert!(began.elapsed() < LIMIT, "{STEPS} steps took {:?}", began.elapsed());
     assert!(!state.reason.contains("not running"), "{state:?}");
-    assert!(!planner.said().contains("WARN"), "{}", planner.said());
+    assert!(!everybody.planner.said().contains("WARN"), "{}", everybody.planner.said());
     session.close();
 }
 

@@ -2,15 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 use homing_core::{DepthImage, FrameSizeError, Intrinsics, RgbImage, RgbdFrame, Stamp};
 
 /// Moments kept while their parts are still arriving.
 const WAITING_MAX: usize = 8;
-
-/// A stamp this much before the last one means that the robot's clock began anew: a restart or a reset.
-const CLOCK_RESTART: Duration = Duration::from_millis(500);
 
 /// Puts the parts of a frame together, in whatever order they arrive.
 #[derive(Default)]
@@ -44,7 +40,7 @@ impl FrameAssembler {
     /// [`FrameSizeError`] when the parts do not have one size.
     pub fn add(&mut self, stamp: Stamp, part: Part) -> Result<Option<RgbdFrame>, FrameSizeError> {
         if let Some(newest) = self.newest_complete {
-            if newest.since(stamp) > CLOCK_RESTART {
+            if stamp.began_anew_after(newest) {
                 self.reset();
             } else if stamp <= newest {
                 return Ok(None);

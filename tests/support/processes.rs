@@ -6,14 +6,25 @@ use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use homing_protocol::{Link, Session, SessionConfig};
+use homing_sim::episode::Episode;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use tempfile::TempDir;
 
-use crate::free_port;
+use crate::{free_port, repository};
 
 /// Long enough for anything on a busy machine; what takes longer is broken.
 pub const LIMIT: Duration = Duration::from_secs(60);
+
+/// The processes of a mission.
+pub struct Everybody {
+    /// The simulated body.
+    pub body: Process,
+    /// Perception.
+    pub perception: Process,
+    /// The planner.
+    pub planner: Process,
+}
 
 /// A network and a folder for one test. Only one exists at a time, over all test programs: each test finds the processor
 /// it is timed on.
@@ -62,6 +73,18 @@ impl System {
         self.start(binary, &format!("{settings}\n[session]\nconnect = [\"{}\"]\n", self.endpoint()))
     }
 
+    /// Starts body, perception and planner, one after the other, and waits until they are ready. `settings` are the body's.
+    pub fn everybody(&self, episode: &Episode, settings: &str) -> Everybody {
+        let file = self.file("episode.json", serde_json::to_string(episode).unwrap());
+        let mut body = self.body(&format!("{settings}\nepisode = {file:?}"));
+        body.says("the body is ready");
+        let mut perception = self.node("homing-perception", "");
+        perception.says("perception is ready");
+        let mut planner = self.node("homing-planner", "");
+        planner.says("planner is ready");
+        Everybody { body, perception, planner }
+    }
+
     /// Starts a process on a configuration.
     pub fn start(&self, binary: &str, config: &str) -> Process {
         let stem = format!("{binary}-{}", fs::read_dir(self.folder.path()).unwrap().count());
@@ -96,6 +119,8 @@ impl Process {
     fn start(binary: &str, flags: &[&str], config: &Path, log: PathBuf) -> Self {
         let program = program(binary);
         let child = Command::new(&program)
+            // As an operator starts it: models are named relative to the repository.
+            .current_dir(repository())
             .args(flags)
             .arg("--config")
             .arg(config)

@@ -7,7 +7,17 @@ use core::time::Duration;
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Stamp(pub u64);
 
+/// A stamp this much before the last one is not late: the clock was set back.
+const RESTART: Duration = Duration::from_millis(500);
+
 impl Stamp {
+    /// True if the robot's clock began anew after `last`, by a restart or a reset: stamps and odometry kept from before are
+    /// worthless then. Messages that only overtook each other are nearer together.
+    #[must_use]
+    pub fn began_anew_after(self, last: Stamp) -> bool {
+        last.since(self) > RESTART
+    }
+
     /// From whole seconds and nanoseconds, as ROS messages carry them. Saturates instead of wrapping.
     #[must_use]
     pub fn from_parts(seconds: u32, nanoseconds: u32) -> Self {

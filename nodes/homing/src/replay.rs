@@ -32,7 +32,7 @@ pub struct ReplayArgs {
     #[arg(long, value_name = "50,100", value_delimiter = ',')]
     pairs: Vec<u32>,
     /// Calibration of colour and depth camera, where depth is not registered to the colour: it will be. For 7-Scenes:
-    /// deploy/robot/kinect_v1.toml
+    /// nodes/robot/rigs/kinect_v1.toml
     #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
     #[command(flatten)]

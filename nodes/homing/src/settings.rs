@@ -34,7 +34,8 @@ pub struct SimFile {
 #[derive(Serialize)]
 pub struct PerceptionFile {
     pub features: FeaturesTable,
-    pub matcher: MatcherTable,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub matcher: Option<MatcherTable>,
     pub session: Network,
 }
 
@@ -54,18 +55,18 @@ pub struct MatcherTable {
 #[derive(Clone, Debug, clap::Args)]
 pub struct FeatureArgs {
     /// What finds keypoints: sift, or the name of a model (`homing models` lists them).
-    #[arg(long, default_value = "sift", value_name = "NAME")]
+    #[arg(long, default_value = "homing", value_name = "NAME")]
     pub extractor: String,
-    /// What pairs them: mutual-nearest, dual-softmax, or the name of a model.
-    #[arg(long, default_value = "mutual-nearest", value_name = "NAME")]
-    pub matcher: String,
+    /// What pairs them: mutual-nearest, dual-softmax, or the name of a model; not given: what goes with the extractor.
+    #[arg(long, value_name = "NAME")]
+    pub matcher: Option<String>,
 }
 
 impl PerceptionFile {
     pub fn new(features: &FeatureArgs, session: Network) -> Self {
         Self {
             features: FeaturesTable { extractor: features.extractor.clone() },
-            matcher: MatcherTable { method: features.matcher.clone() },
+            matcher: features.matcher.clone().map(|method| MatcherTable { method }),
             session,
         }
     }

@@ -9,9 +9,6 @@ use crate::memory::{KeyframeMemory, MemoryConfig};
 use crate::onnx::FeatureChoice;
 use crate::{PerceptionConfig, PerceptionError, ResilientEstimator};
 
-/// A stamp this much before the last one means that the robot's clock began anew: what was seen before has no place in its
-/// odometry any more.
-const CLOCK_RESTART: Duration = Duration::from_millis(500);
 /// Without a goal, frames closer together than this are not looked at.
 const IDLE_PERIOD: Duration = Duration::from_millis(500);
 
@@ -80,7 +77,8 @@ impl Registration {
     /// # Errors
     /// As [`ResilientEstimator::estimate`].
     pub fn look(&mut self, frame: &RgbdFrame) -> Result<GoalEstimate, PerceptionError> {
-        if self.last.is_some_and(|last| last.since(frame.stamp) > CLOCK_RESTART) {
+        if self.last.is_some_and(|last| frame.stamp.began_anew_after(last)) {
+            // What was seen before has no place in the odometry any more.
             self.memory.clear();
             self.last = None;
         }

@@ -3,8 +3,6 @@
 mod drive;
 mod sense;
 
-use core::time::Duration;
-
 use homing_core::{
     Action, BearingHint, GoalDiscovery, GridGeometry, Mode, NavigationState, OccupancyGrid, OdometryBuffer, PlanarPose,
     Stamp,
@@ -27,8 +25,6 @@ const ODOMETRY_KEPT: usize = 20_000;
 const HINTS_MAX: usize = 16;
 /// A faint sighting that came to nothing within this many steps is forgotten.
 const HINT_STEPS: u64 = 60;
-/// A reading this much older than the last means that the robot's clock began anew.
-const CLOCK_RESTART: Duration = Duration::from_millis(500);
 /// Rejected readings in a row after which the clock is taken to have restarted.
 const REJECTED_MAX: u32 = 10;
 

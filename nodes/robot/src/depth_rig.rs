@@ -38,7 +38,7 @@ pub enum DepthRigError {
         source: std::io::Error,
     },
     /// The file does not hold a rig.
-    #[error("{}: {what}; deploy/robot/kinect_v1.toml is an example", file.display())]
+    #[error("{}: {what}; nodes/robot/rigs/kinect_v1.toml is an example", file.display())]
     Malformed {
         /// The file.
         file: PathBuf,

@@ -75,7 +75,7 @@ fn reads_seven_scenes() {
 #[test]
 fn a_rig_makes_poses_and_intrinsics_those_of_the_colour_camera() {
     let folder = seven_scenes(&[0, 10]);
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/robot/kinect_v1.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs/kinect_v1.toml");
     let recording = Recording::open_with(folder.path(), Some(&file)).unwrap();
     assert_eq!(recording.intrinsics().fx(), 525.0);
     // Colour lies to the left in the depth camera's view of it, by the calibration's 2.5 cm.
@@ -95,7 +95,7 @@ fn a_rig_makes_poses_and_intrinsics_those_of_the_colour_camera() {
 #[test]
 fn a_rig_of_other_cameras_or_none_is_refused() {
     let folder = open3d(1);
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/robot/kinect_v1.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs/kinect_v1.toml");
     let error = Recording::open_with(folder.path(), Some(&file)).unwrap_err();
     assert!(matches!(error, RecordingError::Rig { found: (8, 6), expected: (640, 480), .. }), "{error}");
     says(&Recording::open_with(folder.path(), Some(&folder.path().join("none.toml"))).unwrap_err(), "none.toml");

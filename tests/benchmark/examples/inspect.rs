@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sift = if has("blind") { nothing } else { SiftConfig::default() };
     let perception = PerceptionConfig { sift, ..PerceptionConfig::default() };
     let features = if has("own") {
-        FeatureChoice::listed("homing-extractor", "homing-matcher", Path::new("nodes/perception/models"))?
+        FeatureChoice::listed("homing", None, Path::new("nodes/perception/models"))?
     } else {
         FeatureChoice::default()
     };

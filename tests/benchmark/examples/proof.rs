@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [n, features @ ..] = arguments.as_slice() else { return Err("proof N_FLATS [EXTRACTOR MATCHER]".into()) };
     let choice = match features {
-        [extractor, matcher] => FeatureChoice::listed(extractor, matcher, Path::new("nodes/perception/models"))?,
+        [extractor, matcher] => FeatureChoice::listed(extractor, Some(matcher), Path::new("nodes/perception/models"))?,
         _ => FeatureChoice::default(),
     };
     let mut setups = Vec::new();

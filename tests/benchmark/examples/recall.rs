@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (first, n): (u64, u64) = (first.parse()?, n.parse()?);
     let choice = match features {
-        [extractor, matcher] => FeatureChoice::listed(extractor, matcher, Path::new("nodes/perception/models"))?,
+        [extractor, matcher] => FeatureChoice::listed(extractor, Some(matcher), Path::new("nodes/perception/models"))?,
         _ => FeatureChoice::default(),
     };
     let mut total = RecallRow::default();

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use homing_benchmark::perception::Setup;
 use homing_perception::onnx::file::sha256_hex;
-use homing_perception::onnx::{ChoiceError, ExtractorChoice, FeatureChoice, MatcherChoice, ModelFile, ModelName};
+use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice, ModelFile, ModelName};
 use homing_perception::{PerceptionConfig, PoseSolver};
 
 const SOLVERS: [(&str, PoseSolver); 4] = [
@@ -24,15 +24,14 @@ pub fn setup(text: &str, models: &Path) -> anyhow::Result<Setup> {
         Some((extractor, matcher)) => (extractor, Some(matcher)),
         None => (features, None),
     };
+    let extractor = ExtractorChoice::resolve(&model(extractor)?, models)?;
+    let matcher = match matcher {
+        Some(name) => MatcherChoice::resolve(&model(name)?, models)?,
+        None => MatcherChoice::belonging_to(&extractor, models)?,
+    };
     let mut setup = Setup {
         name: label.to_owned(),
-        features: FeatureChoice::of(
-            ExtractorChoice::resolve(&model(extractor)?, models)?,
-            match matcher {
-                Some(name) => MatcherChoice::resolve(&model(name)?, models)?,
-                None => matcher_of(extractor, models)?,
-            },
-        ),
+        features: FeatureChoice::of(extractor, matcher),
         perception: PerceptionConfig::default(),
     };
     for part in parts {
@@ -41,14 +40,6 @@ pub fn setup(text: &str, models: &Path) -> anyhow::Result<Setup> {
     }
     setup.perception.check()?;
     Ok(setup)
-}
-
-/// The matcher of the extractor's own name, where the manifest has one, else mutual nearest neighbours.
-fn matcher_of(extractor: &str, models: &Path) -> Result<MatcherChoice, ChoiceError> {
-    match MatcherChoice::resolve(&ModelName::Listed(extractor.to_owned()), models) {
-        Err(ChoiceError::UnknownName { .. }) => Ok(MatcherChoice::MutualNearest),
-        found => found,
-    }
 }
 
 fn model(name: &str) -> anyhow::Result<ModelName> {

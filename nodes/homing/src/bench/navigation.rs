@@ -42,7 +42,7 @@ pub fn run(args: NavigationArgs) -> anyhow::Result<Ended> {
         Policy::Straight => homing_benchmark::Policy::Straight,
         Policy::Frontier => homing_benchmark::Policy::Frontier,
     };
-    let mut features = FeatureChoice::listed(&args.features.extractor, &args.features.matcher, &args.models)?;
+    let mut features = FeatureChoice::listed(&args.features.extractor, args.features.matcher.as_deref(), &args.models)?;
     // Episodes side by side use the cores better than the threads of one.
     features.run.threads = 1;
     let options = BenchOptions { policy, features, threads: args.threads, ..BenchOptions::default() };

@@ -47,7 +47,7 @@ pub struct PerceptionArgs {
     #[arg(long, value_name = "DIR")]
     rgbd: Option<PathBuf>,
     /// Calibration of the recording's colour and depth cameras, where depth is not registered to the colour: it will be. For
-    /// 7-Scenes: deploy/robot/kinect_v1.toml
+    /// 7-Scenes: nodes/robot/rigs/kinect_v1.toml
     #[arg(long, value_name = "FILE", requires = "rgbd")]
     rig: Option<PathBuf>,
     /// Of a recording: every tenth frame as start, with the goal so many original frames later.
@@ -91,7 +91,7 @@ const EXAMPLES: &str = "\
 A configuration is EXTRACTOR[+MATCHER], and after commas: solver=lo-ransac | gravity |
 epnp-ransac | sling-heading, keypoints=N, ratio=R, confidence=C, patches=P, gate=DEGREES, and last label=TEXT.
 Extractor and matcher are names as `homing models` lists them, or CONTRACT=FILE.
-Without a matcher: the model of the extractor's name, else mutual-nearest.
+Without a matcher: the one that goes with the extractor.
 
   homing bench perception --config sift --config homing --pairs 500
   homing bench perception --config homing --config sift,solver=epnp-ransac,label=papers \\
@@ -140,7 +140,10 @@ pub fn run(args: PerceptionArgs) -> anyhow::Result<Ended> {
 }
 
 fn setups(args: &PerceptionArgs) -> anyhow::Result<Vec<Setup>> {
-    let of_features = || vec![format!("{}+{}", args.features.extractor, args.features.matcher)];
+    let of_features = || {
+        let FeatureArgs { extractor, matcher } = &args.features;
+        vec![matcher.as_ref().map_or(extractor.clone(), |matcher| format!("{extractor}+{matcher}"))]
+    };
     let texts = if args.configs.is_empty() { of_features() } else { args.configs.clone() };
     let setups = texts.iter().map(|text| configuration::setup(text, &args.models)).collect::<Result<Vec<_>, _>>()?;
     for (i, setup) in setups.iter().enumerate() {

@@ -129,7 +129,7 @@ fn pipelines(models: &Path) -> Vec<Pipeline> {
 }
 
 fn features(extractor: &str, matcher: &str, models: &Path) -> anyhow::Result<FeatureChoice> {
-    let mut features = FeatureChoice::listed(extractor, matcher, models)?;
+    let mut features = FeatureChoice::listed(extractor, Some(matcher), models)?;
     // Pairs side by side use the cores better than the threads of one.
     features.run.threads = 1;
     if features.uses_models() {

@@ -1,7 +1,6 @@
 //! One estimate per frame: for new frames, for frames sent again, and for all that was seen when the goal changes.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use homing_core::{GoalEstimate, GoalPhoto, RgbdFrame, Stamp};
 use homing_perception::memory::MemoryConfig;
@@ -15,9 +14,6 @@ pub struct Answerer {
     goal_id: Option<u64>,
     last: Option<(RgbdFrame, GoalEstimate)>,
 }
-
-/// A stamp this much before the last one means that the robot's clock began anew.
-const CLOCK_RESTART: Duration = Duration::from_millis(500);
 
 impl Answerer {
     pub fn new(
@@ -56,7 +52,7 @@ impl Answerer {
     /// is given again.
     pub fn again(&mut self, stamp: Stamp) -> Option<GoalEstimate> {
         let (frame, estimate) = self.last.as_ref()?;
-        if frame.stamp.since(stamp) > CLOCK_RESTART {
+        if stamp.began_anew_after(frame.stamp) {
             self.last = None;
             return None;
         }

@@ -112,7 +112,7 @@ impl Config {
     /// As the library's configuration.
     pub fn perception(&self) -> PerceptionConfig {
         let mut config = PerceptionConfig::default();
-        config.sift.keypoints_max = self.features.keypoints_max;
+        config.sift.keypoints_max = self.features.keypoints_max.unwrap_or(config.sift.keypoints_max);
         config.ratio_max = self.matcher.ratio_max;
         config.gates.n_inliers_min = self.gates.n_inliers_min;
         config.gates.patch_share_min = self.gates.patch_share_min;

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use homing_perception::PerceptionConfig;
 use homing_perception::onnx::{
     ChoiceError, ExtractorChoice, ExtractorConfig, FeatureChoice, MatcherChoice, MatcherConfig, ModelFile, ModelName,
     ProviderChoice, RunConfig,
 };
-use homing_perception::{PerceptionConfig, SiftConfig};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -18,8 +18,8 @@ use serde::{Deserialize, Deserializer};
 pub struct FeatureSettings {
     /// "sift", a name of the manifest, or { contract, path, sha256 }.
     pub extractor: ModelSetting,
-    /// Most keypoints per image.
-    pub keypoints_max: usize,
+    /// Most keypoints per image; where none is named, 1024 of a model and 1500 of SIFT.
+    pub keypoints_max: Option<usize>,
     /// A larger image is shrunk to this longer side before a model sees it, pixels.
     pub side_max_px: u32,
 }
@@ -28,8 +28,9 @@ pub struct FeatureSettings {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MatcherSettings {
-    /// "mutual-nearest", "dual-softmax", a name of the manifest, or { contract, path, sha256 }.
-    pub method: ModelSetting,
+    /// "mutual-nearest", "dual-softmax", a name of the manifest, or { contract, path, sha256 }; where none is named, the one
+    /// that goes with the extractor.
+    pub method: Option<ModelSetting>,
     /// Largest ratio of the ratio test (mutual-nearest).
     pub ratio_max: f32,
     /// Smallest confidence of a match (dual-softmax and models); where none is named, the model's own.
@@ -105,8 +106,8 @@ impl ModelSetting {
 impl Default for FeatureSettings {
     fn default() -> Self {
         Self {
-            extractor: ModelSetting::Named(ExtractorChoice::default().name().to_owned()),
-            keypoints_max: SiftConfig::default().keypoints_max,
+            extractor: ModelSetting::Named("homing".to_owned()),
+            keypoints_max: None,
             side_max_px: ExtractorConfig::default().side_max_px,
         }
     }
@@ -114,11 +115,7 @@ impl Default for FeatureSettings {
 
 impl Default for MatcherSettings {
     fn default() -> Self {
-        Self {
-            method: ModelSetting::Named(MatcherChoice::default().name().to_owned()),
-            ratio_max: PerceptionConfig::default().ratio_max,
-            confidence_min: None,
-        }
+        Self { method: None, ratio_max: PerceptionConfig::default().ratio_max, confidence_min: None }
     }
 }
 
@@ -145,13 +142,18 @@ pub fn choice(
         name: runtime.provider.clone(),
         known: ProviderChoice::NAMES.map(|(name, _)| name).join(", "),
     })?;
-    let method = MatcherChoice::resolve(&matcher.method.name(), &runtime.models)?;
+    let extractor = ExtractorChoice::resolve(&features.extractor.name(), &runtime.models)?;
+    let method = match &matcher.method {
+        Some(method) => MatcherChoice::resolve(&method.name(), &runtime.models)?,
+        None => MatcherChoice::belonging_to(&extractor, &runtime.models)?,
+    };
     let confidence_min = matcher.confidence_min.unwrap_or_else(|| method.confidence_min());
+    let keypoints_max = features.keypoints_max.unwrap_or(ExtractorConfig::default().keypoints_max);
     Ok(FeatureChoice {
-        extractor: ExtractorChoice::resolve(&features.extractor.name(), &runtime.models)?,
+        extractor,
         matcher: method,
-        extractor_config: ExtractorConfig { keypoints_max: features.keypoints_max, side_max_px: features.side_max_px },
-        matcher_config: MatcherConfig { keypoints_max: features.keypoints_max, confidence_min },
+        extractor_config: ExtractorConfig { keypoints_max, side_max_px: features.side_max_px },
+        matcher_config: MatcherConfig { keypoints_max, confidence_min },
         run: RunConfig { provider: provider.1, threads: runtime.threads },
         library: (!runtime.library.as_os_str().is_empty()).then(|| runtime.library.clone()),
     })

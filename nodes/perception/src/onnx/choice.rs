@@ -131,6 +131,20 @@ impl MatcherChoice {
         }
     }
 
+    /// The matcher that goes with an extractor: the first of the manifest in `folder` that was trained on it, else mutual
+    /// nearest neighbours.
+    ///
+    /// # Errors
+    /// [`ChoiceError`] for a manifest that cannot be read.
+    pub fn belonging_to(extractor: &ExtractorChoice, folder: &Path) -> Result<Self, ChoiceError> {
+        let ExtractorChoice::Model { file, .. } = extractor else { return Ok(Self::MutualNearest) };
+        let manifest = Manifest::read(folder)?;
+        match manifest.matcher_of(&file.sha256) {
+            Some(entry) => Self::resolve(&ModelName::Listed(entry.name.clone()), folder),
+            None => Ok(Self::MutualNearest),
+        }
+    }
+
     /// Smallest confidence of a match where the configuration names none: the model's own, else the common one.
     #[must_use]
     pub fn confidence_min(&self) -> f32 {
@@ -197,14 +211,18 @@ impl FeatureChoice {
         Self { extractor, matcher, matcher_config, ..Self::default() }
     }
 
-    /// The same, by the names of the manifest in `models`.
+    /// The same, by the names of the manifest in `models`; without a matcher's name, the one that belongs to the extractor.
     ///
     /// # Errors
     /// [`ChoiceError`] for a name that is none, or a manifest that cannot be read.
-    pub fn listed(extractor: &str, matcher: &str, models: &Path) -> Result<Self, ChoiceError> {
+    pub fn listed(extractor: &str, matcher: Option<&str>, models: &Path) -> Result<Self, ChoiceError> {
         let name = |name: &str| ModelName::Listed(name.to_owned());
         let extractor = ExtractorChoice::resolve(&name(extractor), models)?;
-        Ok(Self::of(extractor, MatcherChoice::resolve(&name(matcher), models)?))
+        let matcher = match matcher {
+            Some(matcher) => MatcherChoice::resolve(&name(matcher), models)?,
+            None => MatcherChoice::belonging_to(&extractor, models)?,
+        };
+        Ok(Self::of(extractor, matcher))
     }
 
     /// Opens what is chosen. `config` has the settings of SIFT and of the ratio test.

@@ -133,6 +133,15 @@ impl Manifest {
         of_role.find(|entry| entry.name == name || entry.name == format!("{name}-{suffix}"))
     }
 
+    /// The first matcher that was trained on the extractor of that hash.
+    #[must_use]
+    pub fn matcher_of(&self, extractor_sha256: &str) -> Option<&Entry> {
+        let trained_on_it = |entry: &&Entry| {
+            entry.extractor_sha256.as_ref().is_some_and(|hash| hash.eq_ignore_ascii_case(extractor_sha256))
+        };
+        self.models.iter().filter(|entry| entry.role == Role::Matcher).find(trained_on_it)
+    }
+
     /// Names of the models of a role.
     pub fn names(&self, role: Role) -> impl Iterator<Item = &str> {
         self.models.iter().filter(move |entry| entry.role == role).map(|entry| entry.name.as_str())

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 use homing_core::{
     Base, Camera, DepthImage, GoalEstimate, Intrinsics, Odometry, Sighting, Stamp, Transform, UnseenReason,
@@ -11,8 +10,6 @@ use homing_planner::PlannerObservation;
 
 /// Moments kept while their parts are still arriving.
 const WAITING_MAX: usize = 16;
-/// A stamp this much before the last one means that the robot's clock began anew: a restart or a reset.
-const CLOCK_RESTART: Duration = Duration::from_millis(500);
 /// Odometry kept: five seconds at 50 Hz.
 const ODOMETRY_MAX: usize = 256;
 
@@ -44,7 +41,7 @@ impl Moments {
 
     /// Keeps a reading; says whether the robot's clock began anew, which makes all that was kept worthless.
     pub fn odometry(&mut self, odometry: Odometry) -> bool {
-        let began_anew = self.clock.since(odometry.stamp) > CLOCK_RESTART;
+        let began_anew = odometry.stamp.began_anew_after(self.clock);
         if began_anew {
             self.clear();
         }

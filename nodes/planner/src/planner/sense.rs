@@ -5,7 +5,7 @@ use homing_core::{
     Sighting, wrap_angle,
 };
 
-use super::{CLOCK_RESTART, Decision, HINT_STEPS, HINTS_MAX, ODOMETRY_KEPT, Planner, REJECTED_MAX};
+use super::{Decision, HINT_STEPS, HINTS_MAX, ODOMETRY_KEPT, Planner, REJECTED_MAX};
 use crate::angles::distance;
 use crate::event::PlannerObservation;
 use crate::evidence::{View, weigh};
@@ -20,7 +20,7 @@ impl Planner {
         if !reading.t_odom_base.is_finite() {
             return Err(Decision::hold("the odometry is not a number"));
         }
-        if last.is_some_and(|last| last.stamp.since(reading.stamp) > CLOCK_RESTART) {
+        if last.is_some_and(|last| reading.stamp.began_anew_after(last.stamp)) {
             self.begin_anew(reading);
         } else if !self.odometry.push(*reading) {
             self.n_rejected += 1;

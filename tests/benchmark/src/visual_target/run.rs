@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use homing_core::{
-    Base, DepthImage, GoalEstimate, Mode, Odom, PlanarPose, RgbImage, RgbdFrame, Sighting, Stamp, Transform, UnseenReason,
-    wrap_angle,
+    Base, DepthImage, GoalEstimate, Mode, Odom, PlanarPose, RgbImage, RgbdFrame, Sighting, Stamp, Transform,
+    UnseenReason, wrap_angle,
 };
 use homing_perception::AnyEstimator;
 use homing_planner::PlannerConfig;
@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 
 use super::methods::{Guide, Way};
 use super::pairs::{TargetPair, view};
+use crate::RunError;
 use crate::bench::Policy;
 use crate::episode::{StepRecord, run_episode};
-use crate::RunError;
 
 /// Success is ending nearer to the target than this, metres (paper, 3.2), ...
 pub const SUCCESS_M: f64 = 0.5;

@@ -3,6 +3,7 @@
 
 use homing_core::{FeatureExtractor, Features, RgbImage};
 
+use super::sparse::{N, ONE};
 use super::{ExtractorConfig, ImageNetwork, sparse};
 use crate::PerceptionError;
 use crate::onnx::contract::{Contract, Element, Port, Side};
@@ -20,23 +21,7 @@ pub const CONTRACT: Contract = Contract {
         element: Element::F32,
         shapes: &[&[Side::Is(1), Side::Is(3), Side::Any("H"), Side::Any("W")]],
     }],
-    outputs: &[
-        Port {
-            names: &["keypoints"],
-            element: Element::F32,
-            shapes: &[&[Side::Is(1), Side::Any("N"), Side::Is(2)], &[Side::Any("N"), Side::Is(2)]],
-        },
-        Port {
-            names: &["scores"],
-            element: Element::F32,
-            shapes: &[&[Side::Is(1), Side::Any("N")], &[Side::Any("N")]],
-        },
-        Port {
-            names: &["descriptors"],
-            element: Element::F32,
-            shapes: &[&[Side::Is(1), Side::Any("N"), Side::Any("D")], &[Side::Any("N"), Side::Any("D")]],
-        },
-    ],
+    outputs: &sparse::outputs(Element::F32, &[&[ONE, N, Side::Any("D")], &[N, Side::Any("D")]]),
     explanation: "The image is red, green and blue, 0 to 1, its sides multiples of 32. Keypoints are found by the model, from \
                   -1 (the centre of the first pixel) to 1 (that of the last). Descriptors have 128 or 64 elements.",
 };

@@ -3,8 +3,23 @@
 use homing_core::{Features, Keypoint};
 
 use super::{ExtractorConfig, features};
+use crate::onnx::contract::{Element, Port, Side};
 use crate::onnx::descriptors::normalise;
 use crate::onnx::network::Output;
+
+/// The three outputs; positions and descriptors as the model has them.
+pub(super) const fn outputs(positions: Element, descriptors: &'static [&'static [Side]]) -> [Port; 3] {
+    [
+        Port { names: &["keypoints"], element: positions, shapes: &[&[ONE, N, Side::Is(2)], &[N, Side::Is(2)]] },
+        Port { names: &["scores"], element: Element::F32, shapes: &[&[ONE, N], &[N]] },
+        Port { names: &["descriptors"], element: Element::F32, shapes: descriptors },
+    ]
+}
+
+/// The axis of a batch of one.
+pub(super) const ONE: Side = Side::Is(1);
+/// The axis of the keypoints.
+pub(super) const N: Side = Side::Any("N");
 
 /// Strongest first, in pixels of the tensor; `to_pixel` maps what the model calls a position.
 pub(super) fn read(

@@ -3,6 +3,7 @@
 
 use homing_core::{FeatureExtractor, Features, RgbImage};
 
+use super::sparse::{N, ONE};
 use super::{ExtractorConfig, ImageNetwork, sparse};
 use crate::PerceptionError;
 use crate::onnx::contract::{Contract, Element, Port, Side};
@@ -20,23 +21,7 @@ pub const CONTRACT: Contract = Contract {
         element: Element::F32,
         shapes: &[&[Side::Is(1), Side::Is(1), Side::Any("H"), Side::Any("W")]],
     }],
-    outputs: &[
-        Port {
-            names: &["keypoints"],
-            element: Element::F32OrI64,
-            shapes: &[&[Side::Is(1), Side::Any("N"), Side::Is(2)], &[Side::Any("N"), Side::Is(2)]],
-        },
-        Port {
-            names: &["scores"],
-            element: Element::F32,
-            shapes: &[&[Side::Is(1), Side::Any("N")], &[Side::Any("N")]],
-        },
-        Port {
-            names: &["descriptors"],
-            element: Element::F32,
-            shapes: &[&[Side::Is(1), Side::Any("N"), Side::Is(DIMENSION)], &[Side::Any("N"), Side::Is(DIMENSION)]],
-        },
-    ],
+    outputs: &sparse::outputs(Element::F32OrI64, &[&[ONE, N, Side::Is(DIMENSION)], &[N, Side::Is(DIMENSION)]]),
     explanation: "The image is luma (BT.601), 0 to 1, its sides multiples of 8. Keypoints are columns and rows of pixels, \
                   found by the model.",
 };

@@ -1,7 +1,7 @@
 //! What attention matchers have in common: normalised positions and descriptors in, matches out, fewer keypoints where
 //! memory runs short.
 
-use homing_core::{FeatureMatch, Features};
+use homing_core::{FeatureMatch, Features, Matcher};
 
 use super::MatcherConfig;
 use crate::PerceptionError;
@@ -22,27 +22,35 @@ pub(super) enum Takes {
     ScoresToo,
 }
 
+/// Makes (query, goal, confidence) of the outputs, given the number of query keypoints.
+type Read = fn(&[Output<'_>], usize) -> Result<Vec<(i64, i64, f32)>, String>;
+
+/// What tells the matchers of one contract from those of another.
+#[derive(Copy, Clone, Debug)]
+pub(super) struct Form {
+    /// The contract's name.
+    pub name: &'static str,
+    pub takes: Takes,
+    pub read: Read,
+}
+
 /// A network that matches two sets of features.
-pub(super) struct Glue {
+pub(super) struct GlueMatcher {
     network: Box<dyn Network>,
-    takes: Takes,
+    form: Form,
     config: MatcherConfig,
     /// Below the configured number while memory is short.
     keypoints_max: usize,
 }
 
-impl Glue {
-    pub fn new(network: Box<dyn Network>, takes: Takes, config: MatcherConfig) -> Self {
-        Self { network, takes, config, keypoints_max: config.keypoints_max }
+impl Matcher for GlueMatcher {
+    type Error = PerceptionError;
+
+    fn name(&self) -> &str {
+        self.form.name
     }
 
-    /// Matches; `read` makes (query, goal, confidence) of the outputs, given the number of query keypoints.
-    pub fn run(
-        &mut self,
-        query: &Features,
-        goal: &Features,
-        read: impl Fn(&[Output<'_>], usize) -> Result<Vec<(i64, i64, f32)>, String>,
-    ) -> Result<Vec<FeatureMatch>, PerceptionError> {
+    fn match_features(&mut self, query: &Features, goal: &Features) -> Result<Vec<FeatureMatch>, PerceptionError> {
         if query.keypoints.is_empty() || goal.keypoints.is_empty() {
             return Ok(Vec::new());
         }
@@ -51,9 +59,9 @@ impl Glue {
             let sides = (Side::of(query, self.keypoints_max), Side::of(goal, self.keypoints_max));
             let (n_query, n_goal) = (sides.0.n, sides.1.n);
             let mut matches = Ok(Vec::new());
-            let given = inputs(&sides.0, &sides.1, self.takes, self.network.inputs());
+            let given = inputs(&sides.0, &sides.1, self.form.takes, self.network.inputs());
             let ran = self.network.run(&given, &mut |outputs| {
-                matches = read(outputs, n_query);
+                matches = (self.form.read)(outputs, n_query);
             });
             match ran {
                 Ok(()) => {
@@ -64,6 +72,12 @@ impl Glue {
                 Err(fault) => self.give_way(fault, n_query.max(n_goal))?,
             }
         }
+    }
+}
+
+impl GlueMatcher {
+    pub fn new(network: Box<dyn Network>, form: Form, config: MatcherConfig) -> Self {
+        Self { network, form, config, keypoints_max: config.keypoints_max }
     }
 
     fn check(&self, query: &Features, goal: &Features) -> Result<(), PerceptionError> {

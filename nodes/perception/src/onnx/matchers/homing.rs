@@ -1,13 +1,8 @@
 //! Our own matcher: attention over both images, partial assignment by optimal transport.
 
-use homing_core::{FeatureMatch, Features, Matcher};
-
-use super::MatcherConfig;
-use super::glue::{Glue, Takes, read_per_keypoint};
-use crate::PerceptionError;
+use super::glue::{Form, Takes, read_per_keypoint};
 use crate::onnx::contract::{Contract, Element, Port, Side};
 use crate::onnx::extractors::homing::DIMENSION;
-use crate::onnx::network::Network;
 
 /// Contract `homing` of matchers.
 pub const CONTRACT: Contract = Contract {
@@ -39,25 +34,5 @@ const fn per_keypoint(names: &'static [&'static str], element: Element) -> Port 
 
 const N: Side = Side::Any("N");
 
-/// Matcher of contract `homing-matcher`.
-pub struct HomingMatcher(Glue);
-
-impl HomingMatcher {
-    /// Around a network that fulfils [`CONTRACT`].
-    #[must_use]
-    pub fn new(network: Box<dyn Network>, config: MatcherConfig) -> Self {
-        Self(Glue::new(network, Takes::ScoresToo, config))
-    }
-}
-
-impl Matcher for HomingMatcher {
-    type Error = PerceptionError;
-
-    fn name(&self) -> &str {
-        CONTRACT.name
-    }
-
-    fn match_features(&mut self, query: &Features, goal: &Features) -> Result<Vec<FeatureMatch>, PerceptionError> {
-        self.0.run(query, goal, read_per_keypoint)
-    }
-}
+/// Matchers of this contract.
+pub(super) const FORM: Form = Form { name: CONTRACT.name, takes: Takes::ScoresToo, read: read_per_keypoint };

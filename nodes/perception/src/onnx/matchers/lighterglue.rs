@@ -1,13 +1,8 @@
 //! LighterGlue: a LightGlue of three layers for XFeat's descriptors, as published with XFeat (Potje et al., CVPR 2024).
 
-use homing_core::{FeatureMatch, Features, Matcher};
-
-use super::MatcherConfig;
-use super::glue::{Glue, Takes, read_pairs};
-use crate::PerceptionError;
+use super::glue::{Form, Takes, read_pairs};
 use crate::onnx::contract::{Contract, Element, Port, Side};
 use crate::onnx::extractors::xfeat::DIMENSION;
-use crate::onnx::network::Network;
 
 /// Contract `lighterglue`.
 pub const CONTRACT: Contract = Contract {
@@ -34,25 +29,5 @@ pub const CONTRACT: Contract = Contract {
                   confidence each.",
 };
 
-/// Matcher of contract `lighterglue`.
-pub struct LighterGlue(Glue);
-
-impl LighterGlue {
-    /// Around a network that fulfils [`CONTRACT`].
-    #[must_use]
-    pub fn new(network: Box<dyn Network>, config: MatcherConfig) -> Self {
-        Self(Glue::new(network, Takes::PositionsAndDescriptors, config))
-    }
-}
-
-impl Matcher for LighterGlue {
-    type Error = PerceptionError;
-
-    fn name(&self) -> &str {
-        CONTRACT.name
-    }
-
-    fn match_features(&mut self, query: &Features, goal: &Features) -> Result<Vec<FeatureMatch>, PerceptionError> {
-        self.0.run(query, goal, read_pairs)
-    }
-}
+/// Matchers of this contract.
+pub(super) const FORM: Form = Form { name: CONTRACT.name, takes: Takes::PositionsAndDescriptors, read: read_pairs };

@@ -1,13 +1,8 @@
 //! LightGlue (Lindenberger, Sarlin, Pollefeys, "LightGlue: Local Feature Matching at Light Speed", ICCV 2023), in the form of
 //! its common ONNX exports.
 
-use homing_core::{FeatureMatch, Features, Matcher};
-
-use super::MatcherConfig;
-use super::glue::{Glue, Takes, read_pairs};
-use crate::PerceptionError;
+use super::glue::{Form, Takes, read_pairs};
 use crate::onnx::contract::{Contract, Element, Port, Side};
-use crate::onnx::network::Network;
 
 /// Contract `lightglue`.
 pub const CONTRACT: Contract = Contract {
@@ -26,25 +21,5 @@ pub const CONTRACT: Contract = Contract {
                   (256) or ALIKED's (128). Matches are pairs of indices with a confidence each.",
 };
 
-/// Matcher of contract `lightglue`.
-pub struct LightGlue(Glue);
-
-impl LightGlue {
-    /// Around a network that fulfils [`CONTRACT`].
-    #[must_use]
-    pub fn new(network: Box<dyn Network>, config: MatcherConfig) -> Self {
-        Self(Glue::new(network, Takes::PositionsAndDescriptors, config))
-    }
-}
-
-impl Matcher for LightGlue {
-    type Error = PerceptionError;
-
-    fn name(&self) -> &str {
-        CONTRACT.name
-    }
-
-    fn match_features(&mut self, query: &Features, goal: &Features) -> Result<Vec<FeatureMatch>, PerceptionError> {
-        self.0.run(query, goal, read_pairs)
-    }
-}
+/// Matchers of this contract.
+pub(super) const FORM: Form = Form { name: CONTRACT.name, takes: Takes::PositionsAndDescriptors, read: read_pairs };

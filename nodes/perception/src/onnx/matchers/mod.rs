@@ -5,6 +5,7 @@ pub mod homing;
 pub mod lighterglue;
 pub mod lightglue;
 
+use self::glue::GlueMatcher;
 use super::AnyMatcher;
 use super::contract::Contract;
 use super::extractors::ExtractorContract;
@@ -70,10 +71,11 @@ impl MatcherContract {
     /// A matcher around a network that fulfils this contract.
     #[must_use]
     pub fn matcher(self, network: Box<dyn Network>, config: MatcherConfig) -> AnyMatcher {
-        match self {
-            Self::Homing => Box::new(homing::HomingMatcher::new(network, config)),
-            Self::LighterGlue => Box::new(lighterglue::LighterGlue::new(network, config)),
-            Self::LightGlue => Box::new(lightglue::LightGlue::new(network, config)),
-        }
+        let form = match self {
+            Self::Homing => homing::FORM,
+            Self::LighterGlue => lighterglue::FORM,
+            Self::LightGlue => lightglue::FORM,
+        };
+        Box::new(GlueMatcher::new(network, form, config))
     }
 }
