@@ -168,14 +168,19 @@ mod tests {
 
     #[test]
     fn a_model_is_named_or_described() {
-        let named: FeatureSettings = toml::from_str("extractor = \"sift\"").unwrap();
+        let named: FeatureSettings = toml::from_str("extractor = \"homing\"").unwrap();
+        let sift: FeatureSettings = toml::from_str("extractor = \"sift\"").unwrap();
         let file: FeatureSettings =
             toml::from_str("extractor = { contract = \"xfeat\", path = \"x.onnx\", sha256 = \"ab\" }").unwrap();
-        let (matcher, runtime) = (MatcherSettings::default(), RuntimeSettings::default());
+        let models = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../models"));
+        let (matcher, runtime) = (MatcherSettings::default(), RuntimeSettings { models, ..RuntimeSettings::default() });
         assert_eq!(
             choice(&named, &matcher, &runtime).unwrap(),
             choice(&FeatureSettings::default(), &matcher, &runtime).unwrap()
         );
+        // The matcher goes with the extractor.
+        assert_eq!(choice(&named, &matcher, &runtime).unwrap().matcher.name(), "homing-matcher");
+        assert_eq!(choice(&sift, &matcher, &runtime).unwrap(), FeatureChoice::default());
         let ExtractorChoice::Model { contract, file } = choice(&file, &matcher, &runtime).unwrap().extractor else {
             unreachable!("a file is a model")
         };
