@@ -74,8 +74,21 @@ fn main() -> ExitCode {
         Ok(Ended::Missed) => ExitCode::from(1),
         Ok(Ended::Interrupted) => ExitCode::from(130),
         Err(cause) => {
-            eprintln!("homing: {cause:#}");
+            eprintln!("homing: {}", in_words(&cause));
             ExitCode::from(2)
         }
     }
+}
+
+/// An error and its causes, each once: many errors already say what caused them.
+fn in_words(error: &anyhow::Error) -> String {
+    let mut said = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if said.is_empty() {
+            said = cause;
+        } else if !said.contains(&cause) {
+            said = format!("{said}: {cause}");
+        }
+    }
+    said
 }

@@ -11,7 +11,7 @@ use super::extractors::{ExtractorConfig, ExtractorContract};
 use super::file::ModelFile;
 use super::inventory::test_image;
 use super::matchers::{MatcherConfig, MatcherContract};
-use super::registry::{Entry, Manifest, Role};
+use super::registry::{Entry, MANIFEST, Manifest, Role};
 use super::session::{OrtNetwork, RunConfig};
 use super::{AnyExtractor, AnyMatcher, ModelError};
 use crate::provider::{Runtime, RuntimeError, find_runtime};
@@ -169,6 +169,9 @@ fn listed(name: &str, role: Role, built_in: &[&str], folder: &Path) -> Result<En
     let manifest = Manifest::read(folder)?;
     manifest.find(name, role).cloned().ok_or_else(|| {
         let what = if role == Role::Extractor { "extractor" } else { "matcher" };
+        if manifest.models.is_empty() {
+            return ChoiceError::NoModels { role: what, name: name.to_owned(), manifest: folder.join(MANIFEST) };
+        }
         unknown(what, name, built_in.iter().copied().chain(manifest.names(role)))
     })
 }

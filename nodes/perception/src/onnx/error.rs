@@ -109,6 +109,20 @@ pub enum ChoiceError {
         /// Names that would do.
         known: String,
     },
+    /// A model's name, and no list of models to look it up in.
+    #[error(
+        "{role} \"{name}\": {} does not exist; start in the repository's root, or say where the models are (--models, or \
+         models in [runtime])",
+        manifest.display()
+    )]
+    NoModels {
+        /// Extractor or matcher.
+        role: &'static str,
+        /// The name given.
+        name: String,
+        /// Where the list was looked for.
+        manifest: PathBuf,
+    },
     /// Extractor and matcher were not made for each other.
     #[error("matcher {matcher} expects {expected}, found {extractor}: choose another, or mutual-nearest")]
     Mismatch {
