@@ -1,5 +1,7 @@
 //! Everything wrong with a model is found at the start, and said with path, expected and found.
 
+use std::path::Path;
+
 use homing_perception::PerceptionConfig;
 use homing_perception::PerceptionError;
 use homing_perception::onnx::registry::MANIFEST;
@@ -221,7 +223,11 @@ fn names_that_nobody_knows_are_answered_with_those_that_are() {
     let folder = Folder::new();
     let listed = ModelName::Listed("homing".to_owned());
     let said = ExtractorChoice::resolve(&listed, folder.path()).unwrap_err().to_string();
-    assert_eq!(said, "extractor \"homing\" is unknown: expected one of sift");
+    assert!(said.contains(MANIFEST) && said.contains("--models"), "{said}");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    let unknown = ModelName::Listed("surf".to_owned());
+    let said = ExtractorChoice::resolve(&unknown, &shipped).unwrap_err().to_string();
+    assert_eq!(said, "extractor \"surf\" is unknown: expected one of sift, homing-extractor, homing-r2d2");
     let file = ModelName::File {
         contract: "superglue".to_owned(),
         file: ModelFile { path: "x".into(), sha256: String::new() },
