@@ -88,8 +88,10 @@ pub fn bench(
         // A pool of its own keeps the renderer's work on this thread: whole episodes side by side use the cores better
         // than the tiles of one picture, and a thread that waits for tiles must not begin another episode.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        let perception = PerceptionConfig { threads: Some(1), ..options.perception };
+        let mut estimator = AnyEstimator::open(perception, &options.features)?;
         while let Some(&seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let result = pool.install(|| run_seed(seed, options));
+            let result = pool.install(|| run_seed(seed, options, &mut estimator));
             if let Ok((row, _)) = &result {
                 progress(row);
             }
@@ -107,19 +109,18 @@ pub fn bench(
     Ok(BenchReport::new(options, rows))
 }
 
-fn run_seed(seed: u64, options: &BenchOptions) -> Result<(EpisodeRow, StageSeconds), RunError> {
+fn run_seed(
+    seed: u64,
+    options: &BenchOptions,
+    estimator: &mut AnyEstimator,
+) -> Result<(EpisodeRow, StageSeconds), RunError> {
     let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
     let episode = episode::draw(&arena, seed, &options.spec)?;
     let mut watch = Watch::default();
-    let perception = PerceptionConfig { threads: Some(1), ..options.perception };
-    let run = run_episode(
-        &arena,
-        &episode,
-        &mut AnyEstimator::open(perception, &options.features)?,
-        options.planner.clone(),
-        options.policy.build(),
-        &mut |record| watch.see(&arena, &episode, record),
-    )?;
+    let run =
+        run_episode(&arena, &episode, estimator, options.planner.clone(), options.policy.build(), &mut |record| {
+            watch.see(&arena, &episode, record)
+        })?;
     let row = EpisodeRow {
         seed,
         cause: (!run.score.success).then(|| watch.cause(run.mode)),

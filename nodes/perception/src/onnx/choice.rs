@@ -309,7 +309,7 @@ impl FeatureChoice {
     /// One run of each on a test image: whatever only running tells is told now.
     fn prove(&self, extractor: &mut AnyExtractor, matcher: &mut AnyMatcher) -> Result<(), PerceptionError> {
         let features: Features = extractor.extract(&test_image())?;
-        tracing::info!(
+        tracing::debug!(
             "{} found {} keypoints with descriptors of length {} on the test image",
             extractor.name(),
             features.keypoints.len(),

@@ -139,14 +139,14 @@ impl OrtNetwork {
     }
 
     fn say(&self, asked: ProviderChoice) {
+        let (model, mut why) = (self.contract.name, String::new());
         for (provider, reason) in &self.refused {
-            let model = self.contract.name;
             match asked {
-                ProviderChoice::Auto => tracing::info!("{model}: no {} here: {reason}", provider.name()),
+                ProviderChoice::Auto => why = format!("{why}; no {}: {reason}", provider.name()),
                 _ => tracing::warn!("{model}: {} was asked for and is not there: {reason}", provider.name()),
             }
         }
-        tracing::info!(path = %self.model.path.display(), "{} runs on {}", self.contract.name, self.provider.name());
+        tracing::info!("{model} runs on {} ({}{why})", self.provider.name(), self.model.path.display());
     }
 
     fn failed(&self, cause: &impl fmt::Display) -> ModelError {
