@@ -10,6 +10,7 @@ use homing_core::PlanarPose;
 use homing_privileged::{EPISODE_SUMMARY, GROUND_TRUTH, GroundTruth};
 use homing_protocol::convert::{EncodedPhoto, ToDomain};
 use homing_protocol::interfaces::homing_msgs::{self, EpisodeSummary};
+use homing_protocol::navigate::Outcome;
 use homing_protocol::session::{DEFAULT_ENDPOINT, Link, SessionConfig, SessionError};
 use homing_protocol::{Session, Subscription, topics};
 use homing_sim::episode::{self, GoalPlace};
@@ -87,6 +88,7 @@ impl Policy {
 
 #[tokio::main]
 pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
+    args.features.check()?;
     let viewer = args.view.then(viewer).transpose()?;
     let given = args.goal.as_deref().map(|path| photo::read(path, args.hfov_deg)).transpose()?;
     let bar = waiting("preparing the scene");
@@ -128,8 +130,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
         }
     };
 
-    tokio::time::sleep(Duration::from_millis(300)).await;
-    scorer.listen();
+    scorer.hear_the_end(report.outcome == Outcome::Arrived).await;
     let score = if args.goal.is_some() { None } else { scorer.score(&task)? };
     let about = About {
         scene: task.arena.scene().name.clone(),
@@ -321,7 +322,30 @@ struct Scorer {
     last: Option<GroundTruth>,
 }
 
+/// The truth of the last step comes after the step's result, once the body has looked again.
+const LAST_TRUTH_MAX: Duration = Duration::from_secs(5);
+/// Who gave up says nothing that marks an end: a pause does.
+const PAUSE: Duration = Duration::from_millis(300);
+
 impl Scorer {
+    /// Waits for the truth that belongs to the mission's end.
+    async fn hear_the_end(&mut self, arrived: bool) {
+        let limit = if arrived { LAST_TRUTH_MAX } else { PAUSE };
+        let began = tokio::time::Instant::now();
+        while began.elapsed() < limit {
+            self.listen();
+            if self.last.as_ref().is_some_and(|truth| truth.done) {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        if arrived {
+            tracing::warn!(
+                "the body did not confirm within {LAST_TRUTH_MAX:?} that it stands; the score is that of the step before"
+            );
+        }
+    }
+
     fn listen(&mut self) {
         while let Some(received) = self.truths.try_recv() {
             match received.map_err(anyhow::Error::from).and_then(|r| Ok(r.message.to_domain()?)) {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use homing_perception::onnx::inventory::AnyContract;
 use homing_perception::onnx::{
@@ -57,7 +57,10 @@ pub fn run(args: ModelsArgs) -> anyhow::Result<Ended> {
     }
     let manifest = Manifest::read(&args.models)?;
     if manifest.models.is_empty() {
-        println!("no models are listed in {}", args.models.display());
+        bail!(
+            "{}: no models are listed; start in the repository's root, or name their folder with --models",
+            args.models.display()
+        );
     }
     let mut all_well = true;
     for entry in &manifest.models {
@@ -69,7 +72,8 @@ pub fn run(args: ModelsArgs) -> anyhow::Result<Ended> {
     if args.explain {
         AnyContract::all().for_each(|contract| println!("\n{}", contract.explain()));
     } else {
-        println!("\n--explain says what the contracts mean, --check tries the models.");
+        println!("\n--extractor homing and --matcher homing are short for the first of either.");
+        println!("--explain says what the contracts mean, --check tries the models.");
     }
     Ok(ended(all_well))
 }

@@ -55,6 +55,9 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// A frame without an answer for so long ends the replay.
 const ANSWER_MAX: Duration = Duration::from_secs(60);
 
+/// Answers waiting to be read: a new goal brings one for every keyframe that shows it, and none may push out the frame's own.
+const ANSWERS_MAX: usize = 128;
+
 /// One frame and what was said about it.
 #[derive(Serialize)]
 struct Row {
@@ -93,6 +96,7 @@ struct Stages {
 
 #[tokio::main]
 pub async fn run(args: ReplayArgs) -> anyhow::Result<Ended> {
+    args.features.check()?;
     let recording = Recording::open_with(&args.dir, args.rig.as_deref())?;
     let plans = plans(&args, &recording)?;
     let folder = RunFolder::create(&args.out, "replay")?;
@@ -145,7 +149,7 @@ async fn play(
     let session = join(args, &mut fleet).await?;
     let mut talk = Talk {
         goals: session.publisher(&topics::GOAL_IMAGE)?,
-        estimates: session.subscribe(&topics::GOAL_ESTIMATE, 8)?,
+        estimates: session.subscribe(&topics::GOAL_ESTIMATE, ANSWERS_MAX)?,
     };
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} frames  [{elapsed}, about {eta} left]  {wide_msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -154,8 +158,10 @@ async fn play(
     for (n, &(query, goal)) in pairs.iter().enumerate() {
         let id = if one_goal { 1 } else { n as u64 + 1 };
         let photo = goal_photo(recording, goal, id)?;
-        let estimate =
-            talk.ask(&mut fleet, &photo, Recording::stamp(query)).await.with_context(|| format!("frame {query}"))?;
+        let estimate = talk.ask(&mut fleet, &photo, Recording::stamp(query)).await.with_context(|| {
+            let logs = crate::run_folder::shown(&folder.file(""));
+            format!("frame {query} of \"{name}\", after {n} of {} pairs; logs and recording are in {logs}", pairs.len())
+        })?;
         let truth = recording.relative_pose_truth(query, goal)?;
         let (pose, n_inliers) = match &estimate.sighting {
             Sighting::Pose { t_camera_goal, n_inliers, .. } => (Some(t_camera_goal), *n_inliers),
@@ -251,7 +257,7 @@ impl Talk {
                 }
             }
         }
-        bail!("perception gave no answer within {ANSWER_MAX:?}; its log is in the run's folder")
+        bail!("no answer of perception about this goal and frame within {ANSWER_MAX:?}")
     }
 }
 

@@ -1,8 +1,12 @@
 //! The TOML files that `homing` writes for the processes it starts: only what differs from their defaults.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use homing_perception::onnx::{ChoiceError, FeatureChoice};
 use serde::Serialize;
+
+/// Where perception looks for its models unless told otherwise.
+const MODELS: &str = "nodes/perception/models";
 
 #[derive(Serialize)]
 pub struct Network {
@@ -54,12 +58,19 @@ pub struct MatcherTable {
 /// Which features perception uses.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FeatureArgs {
-    /// What finds keypoints: sift, or the name of a model (`homing models` lists them).
+    /// What finds keypoints: sift, or the name of a model (`homing models` lists them; "homing" is homing-extractor).
     #[arg(long, default_value = "homing", value_name = "NAME")]
     pub extractor: String,
     /// What pairs them: mutual-nearest, dual-softmax, or the name of a model; not given: what goes with the extractor.
     #[arg(long, value_name = "NAME")]
     pub matcher: Option<String>,
+}
+
+impl FeatureArgs {
+    /// Are there such features? Known before any process is started.
+    pub fn check(&self) -> Result<(), ChoiceError> {
+        FeatureChoice::listed(&self.extractor, self.matcher.as_deref(), Path::new(MODELS)).map(|_| ())
+    }
 }
 
 impl PerceptionFile {

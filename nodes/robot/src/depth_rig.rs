@@ -30,7 +30,7 @@ pub struct DepthRig {
 #[derive(Debug, Error)]
 pub enum DepthRigError {
     /// The file cannot be read.
-    #[error("{}: cannot be read ({source})", file.display())]
+    #[error("the rig's file {}: cannot be read ({source}); nodes/robot/rigs/kinect_v1.toml is an example", file.display())]
     Unreadable {
         /// The file.
         file: PathBuf,
@@ -38,7 +38,7 @@ pub enum DepthRigError {
         source: std::io::Error,
     },
     /// The file does not hold a rig.
-    #[error("{}: {what}; nodes/robot/rigs/kinect_v1.toml is an example", file.display())]
+    #[error("the rig's file {}: {what}; nodes/robot/rigs/kinect_v1.toml is an example", file.display())]
     Malformed {
         /// The file.
         file: PathBuf,
@@ -91,7 +91,7 @@ impl DepthRig {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let table: RigFile = toml::from_str(text).map_err(|e| e.to_string())?;
+        let table: RigFile = toml::from_str(text).map_err(|e| e.message().to_owned())?;
         let camera = |name: &str, camera: &CameraTable| camera.intrinsics().map_err(|e| format!("[{name}]: {e}"));
         Ok(Self {
             colour: camera("colour", &table.colour)?,

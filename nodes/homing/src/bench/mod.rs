@@ -51,6 +51,9 @@ pub fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
     };
     match parse() {
         Some(range) if range.start < range.end => Ok(range),
+        Some(_) => {
+            Err(format!("{text:?} is empty: the last seed is not among them, as in 1000..1001 for seed 1000 alone"))
+        }
         _ => Err(format!("{text:?} is not a range of seeds such as 1000..1100")),
     }
 }

@@ -51,12 +51,13 @@ pub struct PerceptionArgs {
     #[arg(long, value_name = "FILE", requires = "rgbd")]
     rig: Option<PathBuf>,
     /// Of a recording: every tenth frame as start, with the goal so many original frames later.
-    #[arg(long, value_name = "50,100", value_delimiter = ',', default_value = "50,100")]
+    #[arg(long, value_name = "50,100", value_delimiter = ',', default_value = "50,100", requires = "rgbd")]
     gaps: Vec<u32>,
     /// Seeds of the flats, as A..B; as many of them as the pairs need.
     #[arg(long, default_value = "300000..302000", value_parser = seeds)]
     seeds: std::ops::Range<u64>,
-    /// Pairs with the goal in view, and without, together: half of each. Those half in view come on top.
+    /// Pairs with the goal in view, and without, together: half of each. Those half in view come on top, and the last flat
+    /// is measured to its end.
     #[arg(long, default_value_t = 6500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pairs: u32,
     /// Views of each flat.

@@ -32,6 +32,6 @@ pub enum Answers {
     /// About any goal.
     #[default]
     AnyGoal,
-    /// The n-th frame waits for an answer about goal n, counted from 1: every frame has a goal of its own.
+    /// The n-th frame waits for an answer about goal n, counted from 1, or a later one: every frame has a goal of its own.
     GoalPerFrame,
 }

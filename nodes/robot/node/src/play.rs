@@ -13,12 +13,14 @@ use crate::config::Answers;
 
 /// A frame is sent again after so long without an answer: perception may have joined late.
 const AGAIN: Duration = Duration::from_secs(1);
+/// Answers waiting to be read: a new goal brings one for every keyframe that shows it, and none may push out the frame's own.
+const ANSWERS_MAX: usize = 128;
 /// A frame without an answer for so long ends the replay.
 const ANSWER_MAX: Duration = Duration::from_secs(60);
 
 pub async fn run(session: &Session, mut body: ReplayBody, answers: Answers) -> anyhow::Result<()> {
     let out = BodyPublishers::announce(session, body.capabilities().t_base_camera)?;
-    let estimates = session.subscribe(&topics::GOAL_ESTIMATE, 4)?;
+    let estimates = session.subscribe(&topics::GOAL_ESTIMATE, ANSWERS_MAX)?;
     tracing::info!(name = body.capabilities().name, frames = body.recording().len(), "the recording is ready");
     for n in 1.. {
         let observation = match body.observe() {
@@ -58,5 +60,6 @@ async fn answered(
 
 fn closes(estimate: &GoalEstimate, observation: &Observation, goal: Option<u64>) -> bool {
     let no_goal = matches!(estimate.sighting, Sighting::NotSeen { reason: UnseenReason::NoGoal });
-    estimate.stamp == observation.frame.stamp && !no_goal && goal.is_none_or(|id| id == estimate.goal_id)
+    // A later goal is given only after somebody heard the answer about this one: it need not be heard here, too.
+    estimate.stamp == observation.frame.stamp && !no_goal && goal.is_none_or(|id| id <= estimate.goal_id)
 }
