@@ -182,6 +182,10 @@ async fn play(
         times.push(estimate.times);
         bar.inc(1);
     }
+    if let Some(&(_, goal)) = pairs.last().filter(|_| !one_goal) {
+        // The last frame, too, is held until a goal after its own shows that its answer was heard.
+        talk.goals.publish(&goal_photo(recording, goal, pairs.len() as u64 + 1)?.to_message())?;
+    }
     bar.finish_and_clear();
     session.close();
     Ok(table(name, rows, &scores, &times))
@@ -245,7 +249,7 @@ impl Talk {
         photo: &EncodedPhoto,
         stamp: homing_core::Stamp,
     ) -> anyhow::Result<GoalEstimate> {
-        let began = Instant::now();
+        let (began, mut other) = (Instant::now(), None);
         while began.elapsed() < ANSWER_MAX {
             check(fleet)?;
             self.goals.publish(&photo.to_message())?;
@@ -255,9 +259,17 @@ impl Talk {
                 if estimate.stamp == stamp && estimate.goal_id == photo.id {
                     return Ok(estimate);
                 }
+                other = Some((estimate.goal_id, estimate.stamp.seconds()));
             }
         }
-        bail!("no answer of perception about this goal and frame within {ANSWER_MAX:?}")
+        let last = other.map_or("there was no other".to_owned(), |(goal, seconds)| {
+            format!("the last was about goal {goal} and the frame at {seconds:.3} s")
+        });
+        bail!(
+            "no answer of perception about goal {} and the frame at {:.3} s within {ANSWER_MAX:?}; {last}",
+            photo.id,
+            stamp.seconds()
+        )
     }
 }
 

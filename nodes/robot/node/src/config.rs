@@ -32,6 +32,6 @@ pub enum Answers {
     /// About any goal.
     #[default]
     AnyGoal,
-    /// The n-th frame waits for an answer about goal n, counted from 1, or a later one: every frame has a goal of its own.
+    /// Every frame has a goal of its own, counted from 1: the n-th stays until it is answered about a goal after n.
     GoalPerFrame,
 }

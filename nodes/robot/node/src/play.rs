@@ -60,6 +60,7 @@ async fn answered(
 
 fn closes(estimate: &GoalEstimate, observation: &Observation, goal: Option<u64>) -> bool {
     let no_goal = matches!(estimate.sighting, Sighting::NotSeen { reason: UnseenReason::NoGoal });
-    // A later goal is given only after somebody heard the answer about this one: it need not be heard here, too.
-    estimate.stamp == observation.frame.stamp && !no_goal && goal.is_none_or(|id| id <= estimate.goal_id)
+    // Answers are dropped where a link is slow. The next goal is given only once the answer about this one was heard by
+    // whoever gives it; until then the frame stays, and is answered again.
+    estimate.stamp == observation.frame.stamp && !no_goal && goal.is_none_or(|id| id < estimate.goal_id)
 }
