@@ -60,6 +60,7 @@ pub enum Ended {
 
 fn main() -> ExitCode {
     homing_protocol::process::start_log();
+    leave_quietly_when_nobody_reads();
     let ended = match Args::parse().command {
         Command::Demo(args) => demo::run(args),
         Command::Goto(args) => goto::run(args),
@@ -78,6 +79,17 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// A reader that has seen enough, such as `head`, is no fault.
+fn leave_quietly_when_nobody_reads() {
+    let otherwise = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if panic.payload_as_str().is_some_and(|said| said.contains("Broken pipe")) {
+            std::process::exit(0);
+        }
+        otherwise(panic);
+    }));
 }
 
 /// An error and its causes, each once: many errors already say what caused them.
