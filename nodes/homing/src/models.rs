@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use homing_perception::onnx::inventory::AnyContract;
+use homing_perception::onnx::registry::FOLDER;
 use homing_perception::onnx::{
     Entry, ExtractorContract, Manifest, MatcherContract, ModelFile, ProviderChoice, Role, RunConfig,
 };
@@ -22,7 +23,7 @@ pub struct ModelsArgs {
     #[arg(long)]
     explain: bool,
     /// The folder with the models and their manifest.json.
-    #[arg(long, default_value = "nodes/perception/models")]
+    #[arg(long, default_value = FOLDER)]
     models: PathBuf,
     /// Check this file in place of the listed ones; needs --contract and --sha256.
     #[arg(long, requires_all = ["contract", "sha256"])]

@@ -274,8 +274,7 @@ impl Talk {
 }
 
 fn goal_photo(recording: &Recording, goal: u32, id: u64) -> anyhow::Result<EncodedPhoto> {
-    let frame = recording.frame(goal)?;
-    Ok(EncodedPhoto { id, file: photo::png(&frame.rgb)?, intrinsics: recording.intrinsics() })
+    Ok(EncodedPhoto { id, file: photo::png(&recording.colour(goal)?)?, intrinsics: recording.intrinsics() })
 }
 
 fn table(name: String, rows: Vec<Row>, scores: &[Option<PairScore>], times: &[StageTimes]) -> Table {

@@ -2,11 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use homing_perception::onnx::registry::FOLDER;
 use homing_perception::onnx::{ChoiceError, FeatureChoice};
 use serde::Serialize;
-
-/// Where perception looks for its models unless told otherwise.
-const MODELS: &str = "nodes/perception/models";
 
 #[derive(Serialize)]
 pub struct Network {
@@ -69,7 +67,7 @@ pub struct FeatureArgs {
 impl FeatureArgs {
     /// Are there such features? Known before any process is started.
     pub fn check(&self) -> Result<(), ChoiceError> {
-        FeatureChoice::listed(&self.extractor, self.matcher.as_deref(), Path::new(MODELS)).map(|_| ())
+        FeatureChoice::listed(&self.extractor, self.matcher.as_deref(), Path::new(FOLDER)).map(|_| ())
     }
 }
 

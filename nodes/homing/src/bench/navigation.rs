@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use homing_benchmark::{BenchOptions, EpisodeRow, bench};
 use homing_perception::onnx::FeatureChoice;
+use homing_perception::onnx::registry::FOLDER;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{can_be_written, seeds};
@@ -24,7 +25,7 @@ pub struct NavigationArgs {
     #[command(flatten)]
     features: FeatureArgs,
     /// The folder with the models and their manifest.json.
-    #[arg(long, default_value = "nodes/perception/models")]
+    #[arg(long, default_value = FOLDER)]
     models: PathBuf,
     /// Episodes side by side; 0 for one per core.
     #[arg(long, default_value_t = 0)]

@@ -9,6 +9,7 @@ use homing_benchmark::perception::{
     Class, MeasureOptions, Measured, PairSource, PerceptionReport, ReportPlan, Setup, SimulatedPairs, Unregistered,
     measure, plots, time_stages,
 };
+use homing_perception::onnx::registry::FOLDER;
 use homing_robot::Recording;
 use homing_sim::views::{Cameras, ViewSpec};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -41,7 +42,7 @@ pub struct PerceptionArgs {
     #[command(flatten)]
     features: FeatureArgs,
     /// The folder with the models and their manifest.json.
-    #[arg(long, default_value = "nodes/perception/models")]
+    #[arg(long, default_value = FOLDER)]
     models: PathBuf,
     /// Measure on this recording instead of on flats: a folder in 7-Scenes or Open3D layout.
     #[arg(long, value_name = "DIR")]

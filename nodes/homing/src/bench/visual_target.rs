@@ -10,6 +10,7 @@ use homing_benchmark::visual_target::{
     contact_sheet,
 };
 use homing_perception::onnx::FeatureChoice;
+use homing_perception::onnx::registry::FOLDER;
 use homing_sim::Viewpoint;
 use homing_sim::views::OVERLAP_MIN;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -41,7 +42,7 @@ pub struct VisualTargetArgs {
     #[arg(long, default_value_t = OVERLAP_MIN, value_name = "SHARE")]
     overlap_min: f64,
     /// The folder with the models and their manifest.json.
-    #[arg(long, default_value = "nodes/perception/models")]
+    #[arg(long, default_value = FOLDER)]
     models: PathBuf,
     /// Pairs side by side; 0 for one per core.
     #[arg(long, default_value_t = 0)]

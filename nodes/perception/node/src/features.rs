@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use homing_perception::PerceptionConfig;
 use homing_perception::onnx::{
     ChoiceError, ExtractorChoice, ExtractorConfig, FeatureChoice, MatcherChoice, MatcherConfig, ModelFile, ModelName,
-    ProviderChoice, RunConfig,
+    ProviderChoice, RunConfig, registry,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
@@ -121,12 +121,7 @@ impl Default for MatcherSettings {
 
 impl Default for RuntimeSettings {
     fn default() -> Self {
-        Self {
-            provider: "auto".to_owned(),
-            threads: 0,
-            library: PathBuf::new(),
-            models: "nodes/perception/models".into(),
-        }
+        Self { provider: "auto".to_owned(), threads: 0, library: PathBuf::new(), models: registry::FOLDER.into() }
     }
 }
 

@@ -12,6 +12,9 @@ use super::matchers::MatcherContract;
 /// Name of the file in the folder of models.
 pub const MANIFEST: &str = "manifest.json";
 
+/// Where the models lie, seen from the repository's root: the default of every process and command.
+pub const FOLDER: &str = "nodes/perception/models";
+
 /// Version of the format that is read.
 const FORMAT: u32 = 1;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use homing_core::{Camera, DepthImage, Frame, Goal, Intrinsics, RgbdFrame, Stamp, Transform};
+use homing_core::{Camera, DepthImage, Frame, Goal, Intrinsics, RgbImage, RgbdFrame, Stamp, Transform};
 
 use super::error::RecordingError;
 use super::{decode, open3d, seven_scenes};
@@ -158,13 +158,21 @@ impl Recording {
     pub fn frame(&self, number: u32) -> Result<RgbdFrame, RecordingError> {
         let entry = self.entry(number)?;
         let size = (self.intrinsics.width(), self.intrinsics.height());
-        let rgb = Arc::new(decode::colour(&entry.colour, size)?);
+        let rgb = Arc::new(self.colour(number)?);
         let depth = Arc::new(match &self.rig {
             None => decode::depth(&entry.depth, size)?,
             Some(rig) => self.registered(rig, &entry.depth)?,
         });
         // Both were checked to have this size.
         Ok(RgbdFrame { stamp: Self::stamp(number), rgb, depth, intrinsics: self.intrinsics })
+    }
+
+    /// The colour of a frame alone: what a photo taken there shows.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn colour(&self, number: u32) -> Result<RgbImage, RecordingError> {
+        decode::colour(&self.entry(number)?.colour, (self.intrinsics.width(), self.intrinsics.height()))
     }
 
     /// Recorded pose of the camera at a frame.

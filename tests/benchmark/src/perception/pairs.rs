@@ -129,12 +129,10 @@ pub trait PairSource: Sync {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_goal_is_in_view_only_near_and_seen() {
-        let facts = |overlap, distance_m| PairFacts {
+impl PairFacts {
+    /// Of two simulated views in one state of their flat, turned alike.
+    pub(super) fn seen(overlap: f64, distance_m: Option<f64>) -> Self {
+        Self {
             kind: PairKind::Seen,
             cluster: 0,
             query: 0,
@@ -144,7 +142,17 @@ mod tests {
             distance_m,
             same_state: true,
             frames_apart: None,
-        };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_goal_is_in_view_only_near_and_seen() {
+        let facts = PairFacts::seen;
         assert_eq!(facts(0.5, Some(2.0)).goal_in_view(), Some(true));
         assert_eq!(facts(0.5, Some(4.5)).goal_in_view(), Some(false));
         assert_eq!(facts(0.2, Some(2.0)).goal_in_view(), None);

@@ -81,22 +81,11 @@ fn is_right(finding: &Finding) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::findings::PoseError;
-    use super::super::pairs::PairKind;
     use super::*;
 
     #[test]
     fn a_switch_is_right_where_it_exploits_what_is_in_view() {
-        let facts = |overlap, distance_m: Option<f64>| PairFacts {
-            kind: PairKind::Seen,
-            cluster: 0,
-            query: 0,
-            goal: 1,
-            overlap,
-            turn_deg: None,
-            distance_m,
-            same_state: true,
-            frames_apart: None,
-        };
+        let facts = PairFacts::seen;
         let pose = |n_inliers, distance_m, position_m: Option<f64>| {
             let error = position_m.map(|position_m| PoseError { position_m, rotation_deg: 1.0, direction_deg: 1.0 });
             Finding::Pose(FoundPose { n_inliers, distance_m, error })
