@@ -12,8 +12,7 @@ use homing_perception::{AnyEstimator, PerceptionConfig};
 use homing_planner::{Frontier, PlannerConfig};
 use homing_privileged::GroundTruth;
 use homing_protocol::navigate::{MissionReport, Outcome};
-use homing_sim::geodesic::GeodesicField;
-use homing_sim::{Arena, Episode, Finish, Score};
+use homing_sim::{Arena, Ending, Episode, Finish, Score};
 use homing_tests::mission::{Mission, flat, photo};
 use homing_tests::processes::System;
 use homing_tests::repository;
@@ -77,13 +76,13 @@ fn written(state: &NavigationState) -> String {
 
 /// The score as an operator with the truth makes it.
 fn score(arena: &Arena, episode: &Episode, truth: &GroundTruth) -> Score {
-    let field = GeodesicField::to(arena.space(), (episode.goal.x_m, episode.goal.y_m)).unwrap();
-    Score::strict(&Finish {
+    let ending = Ending {
         stopped: truth.done,
         steps: truth.steps,
+        last_mile_steps: 0,
         path_length_m: truth.path_length_m,
-        shortest_path_m: episode.shortest_path_m,
-        final_distance_m: field.distance_m(truth.pose.x_m, truth.pose.y_m),
-        final_heading_error_rad: truth.pose.yaw_rad - episode.goal.yaw_rad,
-    })
+        collisions: truth.collisions,
+        pose: truth.pose,
+    };
+    Score::strict(&Finish::new(arena, episode, &ending))
 }

@@ -119,6 +119,58 @@ pub enum Shape {
     Curved,
 }
 
+/// Difficulty by the length of the shortest path (NRNS; "extra" after Mezghani et al.).
+#[derive(Copy, Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// 1.5 to 3 m.
+    Easy,
+    /// 3 to 5 m.
+    Medium,
+    /// 5 to 10 m.
+    Hard,
+    /// Above 10 m.
+    Extra,
+}
+
+impl Level {
+    /// All levels, the easiest first.
+    pub const ALL: [Level; 4] = [Level::Easy, Level::Medium, Level::Hard, Level::Extra];
+
+    /// The level of a shortest path, metres.
+    #[must_use]
+    pub fn of(shortest_path_m: f64) -> Self {
+        match shortest_path_m {
+            m if m < 3.0 => Level::Easy,
+            m if m < 5.0 => Level::Medium,
+            m if m <= 10.0 => Level::Hard,
+            _ => Level::Extra,
+        }
+    }
+
+    /// Least and greatest shortest path, metres.
+    #[must_use]
+    pub fn range_m(self) -> (f64, f64) {
+        match self {
+            Level::Easy => (1.5, 3.0),
+            Level::Medium => (3.0, 5.0),
+            Level::Hard => (5.0, 10.0),
+            Level::Extra => (10.0, 15.0),
+        }
+    }
+
+    /// For tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Level::Easy => "easy",
+            Level::Medium => "medium",
+            Level::Hard => "hard",
+            Level::Extra => "extra",
+        }
+    }
+}
+
 /// Where the goal may lie.
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
 pub enum GoalPlace {

@@ -22,5 +22,5 @@ pub mod views;
 pub use arena::{Arena, ArenaError, BodySize, SceneRef};
 pub use episode::{Episode, EpisodeSpec, Viewpoint};
 pub use laser::LaserConfig;
-pub use score::{Finish, Score};
+pub use score::{Ending, Finish, Score};
 pub use simulator::{SimConfig, Simulator};

@@ -1,31 +1,77 @@
-//! How an episode went: the strict score.
+//! How an episode went, by two scorers: the strict one, which we quote, and the loose one of the published tables.
 
+use homing_core::{PlanarPose, wrap_angle};
 use serde::{Deserialize, Serialize};
 
+use crate::arena::Arena;
 use crate::constants::{STEPS_MAX, SUCCESS_M};
+use crate::episode::Episode;
+use crate::geodesic::GeodesicField;
 
-/// What the scorer must know of an episode that is over. Ground truth.
+/// How a robot ended. Ground truth.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct Ending {
+    /// The robot declared the goal reached.
+    pub stopped: bool,
+    /// Actions taken, the stop included.
+    pub steps: u64,
+    /// Of these, driving to a goal that was found.
+    pub last_mile_steps: u64,
+    /// Way really made, metres.
+    pub path_length_m: f64,
+    /// Motions that an obstacle cut short.
+    pub collisions: u64,
+    /// Where it is, world frame.
+    pub pose: PlanarPose,
+}
+
+/// What the scorers must know of an episode that is over. Ground truth.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct Finish {
     /// The robot declared the goal reached.
     pub stopped: bool,
     /// Actions taken, the stop included.
     pub steps: u64,
+    /// Of these, driving to a goal that was found.
+    pub last_mile_steps: u64,
     /// Way really made, metres.
     pub path_length_m: f64,
     /// Geodesic distance from start to goal, metres.
     pub shortest_path_m: f64,
     /// Geodesic distance from the last position to the goal, metres; `None` if the goal cannot be reached from there.
     pub final_distance_m: Option<f64>,
+    /// Straight distance from the last position to the goal, walls or not, metres.
+    pub final_straight_m: f64,
     /// Heading of the robot relative to the goal's at the end, radians.
     pub final_heading_error_rad: f64,
+    /// Motions that an obstacle cut short.
+    pub collisions: u64,
 }
 
-/// The strict score: success is the robot's own stop within [`STEPS_MAX`] actions and [`SUCCESS_M`] geodesic metres of
-/// the goal.
+impl Finish {
+    /// Measures how a robot ended against its task.
+    #[must_use]
+    pub fn new(arena: &Arena, episode: &Episode, ending: &Ending) -> Self {
+        let goal = (episode.goal.x_m, episode.goal.y_m);
+        let field = GeodesicField::to(arena.space(), goal).ok();
+        Self {
+            stopped: ending.stopped,
+            steps: ending.steps,
+            last_mile_steps: ending.last_mile_steps,
+            path_length_m: ending.path_length_m,
+            shortest_path_m: episode.shortest_path_m,
+            final_distance_m: field.and_then(|f| f.distance_m(ending.pose.x_m, ending.pose.y_m)),
+            final_straight_m: ending.pose.distance_to(goal.0, goal.1),
+            final_heading_error_rad: ending.pose.yaw_rad - episode.goal.yaw_rad,
+            collisions: ending.collisions,
+        }
+    }
+}
+
+/// What a scorer says.
 #[derive(Copy, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Score {
-    /// Stopped in time and near enough.
+    /// In time and near enough, by the scorer's rule.
     pub success: bool,
     /// Actions taken, the stop included.
     pub steps: u64,
@@ -35,28 +81,49 @@ pub struct Score {
     pub shortest_path_m: f64,
     /// Success weighted by path length (Anderson et al. 2018, arXiv 1807.06757): S l / max(p, l).
     pub spl: f64,
-    /// Geodesic distance to the goal at the end, metres; the straight start distance if it is out of reach.
+    /// The same with max(0, 1 - d / l) for S, d the distance left (Datta et al. 2020).
+    pub soft_spl: f64,
+    /// Distance to the goal at the end, metres, by the scorer's measure; the straight one if there is no way.
     pub final_distance_m: f64,
     /// Absolute difference of headings at the end, degrees.
     pub final_heading_error_deg: f64,
+    /// Motions that an obstacle cut short.
+    pub collisions: u64,
 }
 
 impl Score {
-    /// Scores an episode.
+    /// The strict score, Habitat's: success is the robot's own stop within [`STEPS_MAX`] actions and [`SUCCESS_M`] geodesic
+    /// metres of the goal.
     #[must_use]
     pub fn strict(finish: &Finish) -> Self {
         let distance = finish.final_distance_m;
         let success = finish.stopped && finish.steps <= STEPS_MAX && distance.is_some_and(|d| d <= SUCCESS_M);
-        let longer = finish.path_length_m.max(finish.shortest_path_m);
-        let efficiency = if longer > 0.0 { finish.shortest_path_m / longer } else { 1.0 };
+        Self::new(finish, success, distance.unwrap_or(finish.final_straight_m))
+    }
+
+    /// The score as NRNS and SLING counted: success is to be within [`SUCCESS_M`] straight metres of the goal, walls or not,
+    /// stopped or not, while fewer than [`STEPS_MAX`] actions went by, those of the last mile not counted.
+    #[must_use]
+    pub fn published(finish: &Finish) -> Self {
+        let counted = finish.steps.saturating_sub(finish.last_mile_steps);
+        let success = counted < STEPS_MAX && finish.final_straight_m <= SUCCESS_M;
+        Self::new(finish, success, finish.final_straight_m)
+    }
+
+    fn new(finish: &Finish, success: bool, final_distance_m: f64) -> Self {
+        let (way, shortest) = (finish.path_length_m, finish.shortest_path_m);
+        let efficiency = if way.max(shortest) > 0.0 { shortest / way.max(shortest) } else { 1.0 };
+        let progress = if shortest > 0.0 { (1.0 - final_distance_m / shortest).max(0.0) } else { f64::from(success) };
         Self {
             success,
             steps: finish.steps,
-            path_length_m: finish.path_length_m,
-            shortest_path_m: finish.shortest_path_m,
+            path_length_m: way,
+            shortest_path_m: shortest,
             spl: if success { efficiency } else { 0.0 },
-            final_distance_m: distance.unwrap_or(finish.shortest_path_m),
-            final_heading_error_deg: homing_core::wrap_angle(finish.final_heading_error_rad).abs().to_degrees(),
+            soft_spl: progress * efficiency,
+            final_distance_m,
+            final_heading_error_deg: wrap_angle(finish.final_heading_error_rad).abs().to_degrees(),
+            collisions: finish.collisions,
         }
     }
 }
@@ -69,10 +136,13 @@ mod tests {
     const GOOD: Finish = Finish {
         stopped: true,
         steps: 80,
+        last_mile_steps: 20,
         path_length_m: 8.0,
         shortest_path_m: 6.0,
         final_distance_m: Some(0.4),
+        final_straight_m: 0.3,
         final_heading_error_rad: -0.1,
+        collisions: 2,
     };
 
     #[test]
@@ -83,6 +153,28 @@ mod tests {
         assert!((score.final_heading_error_deg - 5.729_577_951).abs() < 1e-6);
         let short = Score::strict(&Finish { path_length_m: 5.6, ..GOOD });
         assert!((short.spl - 1.0).abs() < 1e-12, "ending before the goal is no better than the shortest path");
+    }
+
+    #[test]
+    fn the_published_rule_is_loose() {
+        let wins = |f: Finish| Score::published(&f).success;
+        // Neither a stop nor a way to the goal is asked for, and the last mile is free.
+        assert!(wins(Finish { stopped: false, final_distance_m: Some(7.0), ..GOOD }));
+        assert!(wins(Finish { final_distance_m: None, ..GOOD }));
+        assert!(wins(Finish { steps: 519, ..GOOD }));
+        assert!(!wins(Finish { steps: 520, ..GOOD }));
+        assert!(!wins(Finish { final_straight_m: 1.000_1, final_distance_m: Some(1.000_1), ..GOOD }));
+        let score = Score::published(&GOOD);
+        assert!((score.spl - 0.75).abs() < 1e-12 && (score.final_distance_m - 0.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn soft_spl_rewards_progress() {
+        // Worked by hand: (1 - 1.5 / 6) * 6 / 8.
+        let half = Finish { final_distance_m: Some(1.5), ..GOOD };
+        let score = Score::strict(&half);
+        assert!(!score.success && (score.soft_spl - 0.5625).abs() < 1e-12);
+        assert_eq!(Score::strict(&Finish { final_distance_m: Some(9.0), ..GOOD }).soft_spl, 0.0);
     }
 
     #[test]
@@ -103,10 +195,12 @@ mod tests {
         let json = serde_json::to_value(Score::strict(&GOOD)).unwrap();
         let keys: Vec<&String> = json.as_object().unwrap().keys().collect();
         let expected = [
+            "collisions",
             "final_distance_m",
             "final_heading_error_deg",
             "path_length_m",
             "shortest_path_m",
+            "soft_spl",
             "spl",
             "steps",
             "success",

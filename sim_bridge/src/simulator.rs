@@ -12,10 +12,9 @@ use crate::arena::Arena;
 use crate::body::{Body, Sliding, Travel};
 use crate::constants::{FORWARD_M, TURN_RAD};
 use crate::episode::{Episode, FloorPose, Viewpoint, t_world_base};
-use crate::geodesic::GeodesicField;
 use crate::laser::LaserConfig;
 use crate::scene::World;
-use crate::score::{Finish, Score};
+use crate::score::{Ending, Finish, Score};
 
 /// Longest single motion, seconds: whatever is asked for beyond it is cut off.
 const MOTION_S_MAX: f64 = 10.0;
@@ -64,6 +63,7 @@ pub struct Simulator {
     speed: (f64, f64),
     path_m: f64,
     steps: u64,
+    collisions: u64,
     stopped: bool,
     seen: Option<Observation>,
 }
@@ -102,6 +102,7 @@ impl Simulator {
             speed: (0.0, 0.0),
             path_m: 0.0,
             steps: 0,
+            collisions: 0,
             stopped: false,
             seen: None,
         })
@@ -184,20 +185,23 @@ impl Simulator {
         self.steps
     }
 
-    /// Scores the episode as it stands. Ground truth.
+    /// How it stands with the robot; `last_mile_steps` only the planner knows. Ground truth.
     #[must_use]
-    pub fn score_truth(&self, episode: &Episode) -> Score {
-        let pose = self.body.pose;
-        let goal = (episode.goal.x_m, episode.goal.y_m);
-        let field = GeodesicField::to(self.arena.space(), goal).ok();
-        Score::strict(&Finish {
+    pub fn ending_truth(&self, last_mile_steps: u64) -> Ending {
+        Ending {
             stopped: self.stopped,
             steps: self.steps,
+            last_mile_steps,
             path_length_m: self.path_m,
-            shortest_path_m: episode.shortest_path_m,
-            final_distance_m: field.and_then(|f| f.distance_m(pose.x_m, pose.y_m)),
-            final_heading_error_rad: pose.yaw_rad - episode.goal.yaw_rad,
-        })
+            collisions: self.collisions,
+            pose: self.body.pose,
+        }
+    }
+
+    /// The strict score of the episode as it stands. Ground truth.
+    #[must_use]
+    pub fn score_truth(&self, episode: &Episode) -> Score {
+        Score::strict(&Finish::new(&self.arena, episode, &self.ending_truth(0)))
     }
 
     fn t_odom_base(&self) -> Transform<Odom, Base> {
@@ -209,6 +213,7 @@ impl Simulator {
         let before = self.t_odom_base();
         let travel = motion(&mut self.body, &self.arena);
         self.path_m += travel.path_m;
+        self.collisions += u64::from(travel.blocked);
         self.now = self.now.after(Duration::from_nanos((duration_s.max(0.0) * 1e9).round() as u64));
         self.seen = None;
         let moved = (before.inverse() * self.t_odom_base()).planar();
@@ -296,6 +301,7 @@ impl Resettable for Simulator {
         self.speed = (0.0, 0.0);
         self.path_m = 0.0;
         self.steps = 0;
+        self.collisions = 0;
         self.stopped = false;
         self.seen = None;
         Ok(())

@@ -15,7 +15,7 @@ use homing_protocol::session::{DEFAULT_ENDPOINT, Link, SessionConfig, SessionErr
 use homing_protocol::{Session, Subscription, topics};
 use homing_sim::episode::{self, GoalPlace};
 use homing_sim::geodesic::GeodesicField;
-use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, Finish, SceneRef, Score};
+use homing_sim::{Arena, BodySize, Ending, Episode, EpisodeSpec, Finish, SceneRef, Score};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::fleet::Fleet;
@@ -357,14 +357,15 @@ impl Scorer {
 
     fn score(&self, task: &Task) -> anyhow::Result<Option<Score>> {
         let Some(truth) = &self.last else { return Ok(None) };
-        Ok(Some(Score::strict(&Finish {
+        let ending = Ending {
             stopped: truth.done,
             steps: truth.steps,
+            last_mile_steps: 0,
             path_length_m: truth.path_length_m,
-            shortest_path_m: task.episode.shortest_path_m,
-            final_distance_m: task.goal_field()?.distance_m(truth.pose.x_m, truth.pose.y_m),
-            final_heading_error_rad: truth.pose.yaw_rad - task.episode.goal.yaw_rad,
-        })))
+            collisions: truth.collisions,
+            pose: truth.pose,
+        };
+        Ok(Some(Score::strict(&Finish::new(&task.arena, &task.episode, &ending))))
     }
 }
 

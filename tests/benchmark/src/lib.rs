@@ -11,6 +11,7 @@ pub mod episode;
 mod error;
 pub mod perception;
 pub mod recall;
+pub mod record;
 pub mod report;
 pub mod visual_target;
 
@@ -18,4 +19,5 @@ pub use bench::{BenchOptions, Policy, bench};
 pub use cause::{Cause, Watch};
 pub use episode::{EpisodeRun, StepRecord, run_episode};
 pub use error::RunError;
+pub use record::{CellKey, EpisodeRecord};
 pub use report::{BenchReport, EpisodeRow};
