@@ -24,7 +24,7 @@ homing-planner-node    -> core planner protocol
 homing-robot-node      -> core robot protocol
 homing-monitor-node    -> core monitor protocol privileged
 homing-sim-node        -> core sim safety protocol privileged
-homing-benchmark       -> core perception planner sim
+homing-benchmark       -> core monitor perception planner sim
 homing                 -> core perception planner robot sim protocol privileged benchmark
 homing-tests           -> core perception planner safety robot sim protocol privileged benchmark
 ";

@@ -66,7 +66,7 @@ pub struct Arena {
     rooms: Vec<Rect>,
     size: BodySize,
     grid: NavGrid,
-    space: FreeSpace,
+    space: Arc<FreeSpace>,
     laser: LaserSlice,
     renderer: OnceLock<Mutex<Renderer>>,
 }
@@ -101,7 +101,7 @@ impl Arena {
     /// [`ArenaError::Floor`] when the scene has no floor.
     pub fn of_scene(scene_ref: SceneRef, scene: Scene, rooms: Vec<Rect>, size: BodySize) -> Result<Self, ArenaError> {
         let grid = NavGrid::new(&scene, size.height_m)?;
-        let space = grid.free_space(&scene.name, size.radius_m)?;
+        let space = Arc::new(grid.free_space(&scene.name, size.radius_m)?);
         let laser = LaserSlice::new(&scene, grid.floor_z_m() + LASER_HEIGHT_M);
         let scene = Arc::new(scene);
         Ok(Self { scene_ref, scene, rooms, size, grid, space, laser, renderer: OnceLock::new() })
@@ -133,7 +133,7 @@ impl Arena {
 
     /// Where the robot can be.
     #[must_use]
-    pub fn space(&self) -> &FreeSpace {
+    pub fn space(&self) -> &Arc<FreeSpace> {
         &self.space
     }
 

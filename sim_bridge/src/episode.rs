@@ -273,7 +273,7 @@ fn random_place(arena: &Arena, rng: &mut ChaCha8Rng) -> Option<(f64, f64)> {
 
 fn candidate(
     arena: &Arena,
-    field: &GeodesicField<'_>,
+    field: &GeodesicField,
     goal: (f64, f64),
     seed: u64,
     spec: &EpisodeSpec,

@@ -13,7 +13,7 @@ const TURNS_MAX: i32 = 12;
 /// The next discrete action towards the field's goal: of all headings in steps of a turn, the one from which a step
 /// forward ends nearest to the goal. `None` once no step ends nearer.
 #[must_use]
-pub fn next_motion(body: &Body, grid: &NavGrid, field: &GeodesicField<'_>) -> Option<Motion> {
+pub fn next_motion(body: &Body, grid: &NavGrid, field: &GeodesicField) -> Option<Motion> {
     let here_m = field.distance_m(body.pose.x_m, body.pose.y_m)?;
     let after = |turns: i32| {
         let mut trial = *body;

@@ -2,6 +2,7 @@
 
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 use thiserror::Error;
 
@@ -23,19 +24,19 @@ pub struct GoalBlocked {
 
 /// Metres to one goal from everywhere, for a robot of one radius. World frame.
 #[derive(Clone, Debug)]
-pub struct GeodesicField<'a> {
-    space: &'a FreeSpace,
+pub struct GeodesicField {
+    space: Arc<FreeSpace>,
     goal: (f64, f64),
     metres: Vec<f64>,
 }
 
-impl<'a> GeodesicField<'a> {
+impl GeodesicField {
     /// Marches from the goal (x, y in metres, world frame): Sethian 1999, second order where its stencil allows.
     ///
     /// # Errors
     /// [`GoalBlocked`] if the robot cannot be there.
-    pub fn to(space: &'a FreeSpace, goal: (f64, f64)) -> Result<Self, GoalBlocked> {
-        let mut field = Self { space, goal, metres: vec![f64::INFINITY; space.geometry().len()] };
+    pub fn to(space: &Arc<FreeSpace>, goal: (f64, f64)) -> Result<Self, GoalBlocked> {
+        let mut field = Self { space: Arc::clone(space), goal, metres: vec![f64::INFINITY; space.geometry().len()] };
         let blocked = GoalBlocked { x_m: goal.0, y_m: goal.1, radius_m: space.radius_m() };
         if field.snapped(goal).is_none() {
             return Err(blocked);
@@ -81,7 +82,8 @@ impl<'a> GeodesicField<'a> {
 
     fn march(&mut self) {
         let g = *self.space.geometry();
-        let free = self.space.cells();
+        let space = Arc::clone(&self.space);
+        let free = space.cells();
         let mut queue = BinaryHeap::new();
         for (index, metres) in self.around_goal() {
             self.metres[index] = metres;

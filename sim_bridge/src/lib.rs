@@ -11,6 +11,7 @@ pub mod geodesic;
 pub mod gltf_scene;
 pub mod laser;
 pub mod nav_grid;
+pub mod oracle;
 mod raster;
 pub mod render;
 pub mod scene;

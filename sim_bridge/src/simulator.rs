@@ -185,6 +185,14 @@ impl Simulator {
         self.steps
     }
 
+    /// Puts the robot somewhere else, as only an oracle can; `way_m` counts as driven. World frame.
+    pub fn teleport(&mut self, pose: PlanarPose, way_m: f64) {
+        self.moving(self.config.velocity_s, |body, _| {
+            body.pose = pose;
+            Travel { path_m: way_m, blocked: false }
+        });
+    }
+
     /// How it stands with the robot; `last_mile_steps` only the planner knows. Ground truth.
     #[must_use]
     pub fn ending_truth(&self, last_mile_steps: u64) -> Ending {

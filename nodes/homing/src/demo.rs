@@ -182,7 +182,7 @@ impl Task {
         Ok(EncodedPhoto { id: photo::name_of(&file), file, intrinsics: self.episode.camera.intrinsics()? })
     }
 
-    fn goal_field(&self) -> anyhow::Result<GeodesicField<'_>> {
+    fn goal_field(&self) -> anyhow::Result<GeodesicField> {
         Ok(GeodesicField::to(self.arena.space(), (self.episode.goal.x_m, self.episode.goal.y_m))?)
     }
 

@@ -29,7 +29,7 @@ pub mod visual_target;
 
 pub use arrival::ArrivalConfig;
 pub use config::{BlindPolicy, BodyConfig, ConfigError, PlannerConfig, UnknownCells};
-pub use discovery::{Frontier, FrontierConfig, Straight};
+pub use discovery::{Frontier, FrontierConfig, RandomGoal, Straight};
 pub use event::{Mission, Perception, PlannerObservation, StepEvent};
 pub use evidence::Evidence;
 pub use fmm::{Marcher, Until};

@@ -9,11 +9,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use homing_benchmark::cause::{is_in_view, right_pose, sighted_pose};
-use homing_benchmark::{Policy, StepRecord, run_episode};
+use homing_benchmark::{Policy, StepRecord, Trial, run_episode};
 use homing_core::{Cell, Mode, OccupancyGrid, PlanarPose, Sighting};
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::{AnyEstimator, PerceptionConfig, SiftConfig};
-use homing_planner::PlannerConfig;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{self, Episode, EpisodeSpec};
 use image::{Rgb, RgbImage};
@@ -51,7 +50,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut estimator = AnyEstimator::open(perception, &features)?;
     let mut marks = Vec::new();
     let mut map = None;
-    let run = run_episode(&arena, &episode, &mut estimator, PlannerConfig::default(), policy.build(), &mut |r| {
+    let trial = Trial { policy, ..Trial::default() };
+    let run = run_episode(&arena, &episode, &mut estimator, &trial, &mut |r| {
         print_step(&arena, &episode, r);
         let sighted = sighted_pose(r).zip(right_pose(r));
         if has("frames") || (has("wrong") && sighted.is_some_and(|(_, right)| !right)) {
@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         });
         map = Some(r.map.clone());
     })?;
-    println!("{:?}: {}\n{:#?}", run.mode, run.reason, run.score);
+    println!("{:?}: {}\n{:#?}", run.mode, run.reason, homing_sim::Score::strict(&run.finish));
     plan(&arena, &episode, map.as_ref(), &marks).save(folder.join("plan.png"))?;
     Ok(())
 }

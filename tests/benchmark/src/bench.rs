@@ -3,39 +3,16 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use homing_core::GoalDiscovery;
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::{AnyEstimator, PerceptionConfig};
-use homing_planner::{Frontier, PlannerConfig, Straight};
+use homing_planner::PlannerConfig;
+use homing_sim::Score;
 use homing_sim::arena::{Arena, BodySize, SceneRef};
 use homing_sim::episode::{self, EpisodeSpec};
-use serde::{Deserialize, Serialize};
 
 use crate::episode::{StageSeconds, run_episode};
 use crate::report::{BenchReport, EpisodeRow};
-use crate::{RunError, Watch};
-
-/// Goal-discovery policies.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Policy {
-    /// Straight ahead, right when blocked (SLING's simplest).
-    Straight,
-    /// To where most of what was never looked at comes into sight.
-    #[default]
-    Frontier,
-}
-
-impl Policy {
-    /// A fresh policy.
-    #[must_use]
-    pub fn build(self) -> Box<dyn GoalDiscovery> {
-        match self {
-            Policy::Straight => Box::new(Straight::new()),
-            Policy::Frontier => Box::new(Frontier::default()),
-        }
-    }
-}
+use crate::{Policy, RunError, Trial, Watch};
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -117,16 +94,10 @@ fn run_seed(
     let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
     let episode = episode::draw(&arena, seed, &options.spec)?;
     let mut watch = Watch::default();
-    let run =
-        run_episode(&arena, &episode, estimator, options.planner.clone(), options.policy.build(), &mut |record| {
-            watch.see(&arena, &episode, record)
-        })?;
-    let row = EpisodeRow {
-        seed,
-        cause: (!run.score.success).then(|| watch.cause(run.mode)),
-        score: run.score,
-        reason: run.reason,
-        watch,
-    };
+    let trial = Trial { policy: options.policy, planner: options.planner.clone(), ..Trial::default() };
+    let run = run_episode(&arena, &episode, estimator, &trial, &mut |record| watch.see(&arena, &episode, record))?;
+    let score = Score::strict(&run.finish);
+    let row =
+        EpisodeRow { seed, cause: (!score.success).then(|| watch.cause(run.mode)), score, reason: run.reason, watch };
     Ok((row, run.times))
 }

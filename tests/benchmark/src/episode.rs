@@ -4,18 +4,19 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use homing_core::{
-    Action, Base, Camera, GoalDiscovery, GoalEstimate, GoalPhoto, Mode, Motion, MotionOutcome, NavigationState,
-    Observation, OccupancyGrid, PlanarPose, Resettable, RobotBridge, Transform,
+    Action, Base, Camera, GoalEstimate, GoalPhoto, Mode, Motion, MotionOutcome, NavigationState, Observation,
+    OccupancyGrid, PlanarPose, Resettable, RobotBridge, Transform,
 };
 use homing_perception::AnyEstimator;
-use homing_planner::{Mission, Perception, Planner, PlannerConfig, PlannerObservation, StepEvent};
+use homing_planner::{Mission, Perception, Planner, PlannerObservation, StepEvent};
 use homing_sim::arena::Arena;
 use homing_sim::episode::{Episode, t_world_base};
-use homing_sim::score::Score;
-use homing_sim::simulator::{SimConfig, Simulator};
+use homing_sim::oracle::{Truth, landing, perfect};
+use homing_sim::score::Finish;
+use homing_sim::simulator::Simulator;
 use serde::{Deserialize, Serialize};
 
-use crate::RunError;
+use crate::{GoalPose, LastMile, RunError, Trial};
 
 /// Names the goal photo of every episode.
 const GOAL_ID: u64 = 1;
@@ -61,12 +62,14 @@ pub struct StageSeconds {
 /// An episode that is over.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EpisodeRun {
-    /// How it went.
-    pub score: Score,
+    /// How it ended, for the scorers.
+    pub finish: Finish,
     /// The planner's last mode.
     pub mode: Mode,
     /// The planner's last words.
     pub reason: String,
+    /// Heading of the goal's place from the robot when it first drove to a goal, radians, left positive: believed, and true.
+    pub first_heading_rad: Option<(f64, f64)>,
     /// Where the time went.
     pub times: StageSeconds,
 }
@@ -82,13 +85,12 @@ pub fn run_episode(
     arena: &Arc<Arena>,
     episode: &Episode,
     estimator: &mut AnyEstimator,
-    planner: PlannerConfig,
-    discovery: Box<dyn GoalDiscovery>,
+    trial: &Trial,
     observer: &mut dyn FnMut(&StepRecord<'_>),
 ) -> Result<EpisodeRun, RunError> {
-    let mut lockstep = Lockstep::new(arena, episode, estimator, planner, discovery)?;
+    let mut lockstep = Lockstep::new(arena, episode, estimator, trial)?;
     while !lockstep.step(observer)? {}
-    Ok(lockstep.finish(episode))
+    Ok(lockstep.finish())
 }
 
 /// Body, perception and planner between two steps.
@@ -96,37 +98,48 @@ struct Lockstep<'a> {
     robot: Simulator,
     estimator: &'a mut AnyEstimator,
     planner: Planner,
-    config: PlannerConfig,
+    trial: &'a Trial,
+    arena: &'a Arc<Arena>,
+    episode: &'a Episode,
+    /// What oracles are told.
+    truth: Truth,
     goal_odom_truth: PlanarPose,
     mission: Option<Mission>,
     motion: Option<MotionOutcome>,
     steps_left: u64,
+    last_mile_steps: u64,
+    first_heading_rad: Option<(f64, f64)>,
     times: StageSeconds,
 }
 
 impl<'a> Lockstep<'a> {
     fn new(
-        arena: &Arc<Arena>,
-        episode: &Episode,
+        arena: &'a Arc<Arena>,
+        episode: &'a Episode,
         estimator: &'a mut AnyEstimator,
-        config: PlannerConfig,
-        discovery: Box<dyn GoalDiscovery>,
+        trial: &'a Trial,
     ) -> Result<Self, RunError> {
-        let mut robot = Simulator::new(Arc::clone(arena), SimConfig::default())?;
+        let mut robot = Simulator::new(Arc::clone(arena), trial.sim.clone())?;
+        let truth = Truth::default();
         robot.reset(episode)?;
         let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
         estimator.set_goal(GoalPhoto { id: GOAL_ID, rgb, intrinsics: episode.camera.intrinsics()? })?;
         let t_world_goal: Transform<_, Base> = t_world_base(arena, episode.goal.into());
         Ok(Self {
-            planner: Planner::new(config.clone(), discovery)?,
+            planner: Planner::new(trial.planner.clone(), trial.policy.build(arena, episode, &truth)?)?,
             goal_odom_truth: (robot.t_world_odom_truth().inverse() * t_world_goal).planar(),
             mission: Some(Mission::Start { goal_id: GOAL_ID }),
             motion: None,
-            steps_left: config.step_budget,
+            steps_left: trial.planner.step_budget,
+            last_mile_steps: 0,
+            first_heading_rad: None,
             times: StageSeconds::default(),
             robot,
             estimator,
-            config,
+            trial,
+            arena,
+            episode,
+            truth,
         })
     }
 
@@ -135,15 +148,18 @@ impl<'a> Lockstep<'a> {
         let start = Instant::now();
         let observation = self.robot.observe()?;
         let observed = Instant::now();
-        let estimate = self.estimator.estimate(&observation.frame)?;
+        let estimate = self.estimate(&observation)?;
         let event = self.event(&observation, &estimate);
+        self.truth.tell(self.robot.pose_truth());
         let asked = Instant::now();
         let action = self.planner.step(observation.odometry.stamp, &event);
         self.count_time(observed - start, &estimate, asked.elapsed());
         self.steps_left = self.steps_left.saturating_sub(1);
 
-        let over = ended(self.planner.state().mode, action) || self.steps_left == 0;
-        let motion = self.motion_of(action, over);
+        self.note_last_mile();
+        let landed = self.teleport();
+        let over = landed || ended(self.planner.state().mode, action) || self.steps_left == 0;
+        let motion = if landed { Motion::Stop { done: true } } else { self.motion_of(action, over) };
         observer(&StepRecord {
             observation: &observation,
             estimate: &estimate,
@@ -157,6 +173,50 @@ impl<'a> Lockstep<'a> {
         });
         self.motion = Some(self.robot.apply(motion)?);
         Ok(over)
+    }
+
+    /// Perception's answer, or the truth where an oracle stands in for it.
+    fn estimate(&mut self, observation: &Observation) -> Result<GoalEstimate, RunError> {
+        let estimate = self.estimator.estimate(&observation.frame)?;
+        Ok(match self.trial.goal_pose {
+            GoalPose::Estimated => estimate,
+            GoalPose::Oracle => perfect(
+                estimate,
+                self.robot.pose_truth(),
+                self.episode.goal.into(),
+                &self.robot.capabilities().t_base_camera,
+            ),
+        })
+    }
+
+    fn note_last_mile(&mut self) {
+        let state = self.planner.state();
+        if !matches!(state.mode, Mode::Exploit | Mode::Align) {
+            return;
+        }
+        self.last_mile_steps += 1;
+        if let (None, Some(goal)) = (self.first_heading_rad, &state.goal) {
+            let (believed, truth) = (goal.pose, self.robot.pose_truth());
+            let goal_truth = (self.episode.goal.x_m, self.episode.goal.y_m);
+            self.first_heading_rad =
+                Some((state.pose.bearing_to(believed.x_m, believed.y_m), truth.bearing_to(goal_truth.0, goal_truth.1)));
+        }
+    }
+
+    /// Oracle-LP: as soon as the planner drives to a goal, the robot is where it believes it to be.
+    fn teleport(&mut self) -> bool {
+        let state = self.planner.state();
+        if self.trial.last_mile == LastMile::Driven || state.mode != Mode::Exploit {
+            return false;
+        }
+        let Some(goal) = &state.goal else { return false };
+        let t_odom_goal: Transform<_, Base> = goal.pose.to_transform();
+        let (from, t_world_odom) = (self.robot.pose_truth(), self.robot.t_world_odom_truth());
+        match landing(self.arena, from, (t_world_odom * t_odom_goal).planar()) {
+            Some((there, way_m)) => self.robot.teleport(there, way_m),
+            None => return false,
+        }
+        true
     }
 
     fn event(&mut self, observation: &Observation, estimate: &GoalEstimate) -> StepEvent {
@@ -180,7 +240,7 @@ impl<'a> Lockstep<'a> {
         if over {
             return Motion::Stop { done: self.planner.state().mode == Mode::Arrived };
         }
-        action.motion(self.config.body.forward_m, self.config.body.turn_rad)
+        action.motion(self.trial.planner.body.forward_m, self.trial.planner.body.turn_rad)
     }
 
     fn count_time(&mut self, observe: Duration, estimate: &GoalEstimate, plan: Duration) {
@@ -191,12 +251,13 @@ impl<'a> Lockstep<'a> {
         self.times.plan += plan.as_secs_f64();
     }
 
-    fn finish(self, episode: &Episode) -> EpisodeRun {
+    fn finish(self) -> EpisodeRun {
         let state = self.planner.state();
         EpisodeRun {
-            score: self.robot.score_truth(episode),
+            finish: Finish::new(self.arena, self.episode, &self.robot.ending_truth(self.last_mile_steps)),
             mode: state.mode,
             reason: state.reason.clone(),
+            first_heading_rad: self.first_heading_rad,
             times: self.times,
         }
     }

@@ -5,6 +5,7 @@ use homing_perception::PerceptionError;
 use homing_planner::ConfigError;
 use homing_sim::arena::ArenaError;
 use homing_sim::episode::DrawError;
+use homing_sim::geodesic::GoalBlocked;
 use homing_sim::views::ViewsError;
 use thiserror::Error;
 
@@ -35,6 +36,9 @@ pub enum RunError {
     /// Colour and depth do not belong together.
     #[error(transparent)]
     Frame(#[from] FrameSizeError),
+    /// The goal is in no place that the robot can reach.
+    #[error("the goal cannot be reached: {0}")]
+    Goal(#[from] GoalBlocked),
     /// Recorded frames cannot be read.
     #[error("recorded frames: {0}")]
     Recording(Box<dyn core::error::Error + Send + Sync>),

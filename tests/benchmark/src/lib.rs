@@ -7,17 +7,21 @@
 
 pub mod bench;
 pub mod cause;
+pub mod clip;
 pub mod episode;
 mod error;
 pub mod perception;
 pub mod recall;
 pub mod record;
 pub mod report;
+pub mod suite;
+pub mod trial;
 pub mod visual_target;
 
-pub use bench::{BenchOptions, Policy, bench};
+pub use bench::{BenchOptions, bench};
 pub use cause::{Cause, Watch};
 pub use episode::{EpisodeRun, StepRecord, run_episode};
 pub use error::RunError;
 pub use record::{CellKey, EpisodeRecord};
 pub use report::{BenchReport, EpisodeRow};
+pub use trial::{GoalPose, LastMile, Policy, Trial};

@@ -47,4 +47,7 @@ pub struct EpisodeRecord {
     pub times: StageSeconds,
     /// From start to end, seconds.
     pub wall_s: f64,
+    /// The program's commit, `+` behind it if the sources were changed since.
+    #[serde(default)]
+    pub commit: String,
 }

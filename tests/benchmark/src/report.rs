@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use homing_sim::score::Score;
 use serde::{Deserialize, Serialize};
 
-use crate::bench::{BenchOptions, Policy};
+use crate::bench::BenchOptions;
 use crate::cause::{Cause, Watch};
 use crate::episode::StageSeconds;
+use crate::trial::Policy;
 
 /// One episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

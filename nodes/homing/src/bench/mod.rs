@@ -4,6 +4,7 @@ mod configuration;
 mod navigation;
 mod perception;
 mod recorded;
+mod tables;
 mod visual_target;
 
 use std::path::Path;
@@ -34,6 +35,7 @@ enum What {
     Perception(Box<perception::PerceptionArgs>),
     /// From a view to another view of the same flat, without a map: the table of the paper "Visual Target Navigation".
     VisualTarget(visual_target::VisualTargetArgs),
+    Tables(Box<tables::TablesArgs>),
 }
 
 pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
@@ -41,6 +43,7 @@ pub fn run(args: BenchArgs) -> anyhow::Result<Ended> {
         None => navigation::run(args.navigation),
         Some(What::Perception(args)) => perception::run(*args),
         Some(What::VisualTarget(args)) => visual_target::run(args),
+        Some(What::Tables(args)) => tables::run(*args),
     }
 }
 

@@ -2,7 +2,9 @@
 
 mod coverage;
 mod frontier;
+mod random_goal;
 mod straight;
 
 pub use frontier::{Frontier, FrontierConfig};
+pub use random_goal::RandomGoal;
 pub use straight::Straight;

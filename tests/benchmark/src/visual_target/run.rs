@@ -7,7 +7,6 @@ use homing_core::{
     UnseenReason, wrap_angle,
 };
 use homing_perception::AnyEstimator;
-use homing_planner::PlannerConfig;
 use homing_planner::visual_target::{Approach, Decision, Ending, Look, Refinement};
 use homing_sim::arena::Arena;
 use homing_sim::episode::{Episode, FloorPose, Shape, Viewpoint};
@@ -17,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::methods::{Guide, Way};
 use super::pairs::{TargetPair, view};
 use crate::RunError;
-use crate::bench::Policy;
+use crate::Trial;
 use crate::episode::{StepRecord, run_episode};
 
 /// Success is ending nearer to the target than this, metres (paper, 3.2), ...
@@ -165,8 +164,7 @@ impl<'a> Robot<'a> {
             let look = Look { t_odom_base: step.pose_truth.to_transform(), t_base_camera, sighting };
             looks.push(record(&look, step.estimate.n_matches, end, pair.target));
         };
-        let (config, policy) = (PlannerConfig::default(), Policy::Frontier.build());
-        let run = run_episode(self.arena, &episode, self.estimator, config, policy, &mut follow)?;
+        let run = run_episode(self.arena, &episode, self.estimator, &Trial::default(), &mut follow)?;
         // A robot that stands there without knowing has not arrived.
         let arrived = run.mode == Mode::Arrived;
         let ended = PairRun::new(pair, end, run.reason, looks);

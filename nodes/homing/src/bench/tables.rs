@@ -1,0 +1,184 @@
+//! `homing bench tables`: the papers' tables, beside ours.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use homing_benchmark::EpisodeRecord;
+use homing_benchmark::clip::ClipFolder;
+use homing_benchmark::suite::run::GoOn;
+use homing_benchmark::suite::{self, Amounts, Header, Plan, Row, RunOptions, Shard, Store};
+use homing_perception::onnx::FeatureChoice;
+use homing_perception::onnx::registry::FOLDER;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::Ended;
+use crate::settings::FeatureArgs;
+
+/// Runs what SLING's, modular image-goal navigation's and visual target navigation's tables ask for, on episodes of our own
+/// and on real layouts, and writes the report: published figures beside ours.
+///
+/// Every episode is kept as it ends. A run that is interrupted or killed goes on where it was when it is started again.
+#[derive(Args)]
+pub struct TablesArgs {
+    /// One episode for each cell of the tables: some minutes.
+    #[arg(long)]
+    quick: bool,
+    /// Where results and report are kept; a run with the same settings goes on there.
+    #[arg(long, default_value = "runs/tables", value_name = "FOLDER")]
+    out: PathBuf,
+    /// Episodes for each level of the headline rows.
+    #[arg(long, value_name = "N")]
+    headline: Option<usize>,
+    /// Episodes for each level of the other rows.
+    #[arg(long, value_name = "N")]
+    others: Option<usize>,
+    /// Only these rows (see the report for their names); may be given several times.
+    #[arg(long = "row", value_name = "NAME")]
+    rows: Vec<String>,
+    /// Do only part I of N, from 0: the other parts run in other processes, on this folder.
+    #[arg(long, value_name = "I/N", value_parser = shard, default_value = "0/1")]
+    shard: Shard,
+    #[command(flatten)]
+    features: FeatureArgs,
+    /// The folder with the models and their manifest.json.
+    #[arg(long, default_value = FOLDER)]
+    models: PathBuf,
+    /// Episodes side by side; 0 for one per core.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// No recordings of failed episodes.
+    #[arg(long)]
+    no_clips: bool,
+    /// Run nothing; write the report of what there is.
+    #[arg(long)]
+    report: bool,
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let parse = || {
+        let (index, of) = text.split_once('/')?;
+        Some(Shard { index: index.parse().ok()?, of: of.parse().ok()? })
+    };
+    match parse() {
+        Some(shard) if shard.index < shard.of => Ok(shard),
+        _ => Err(format!("{text:?} is not a part such as 0/2 or 1/2")),
+    }
+}
+
+pub fn run(args: TablesArgs) -> anyhow::Result<Ended> {
+    let rows = chosen_rows(&args)?;
+    if !args.report {
+        if let Ended::Interrupted = run_episodes(&args, &rows)? {
+            return Ok(Ended::Interrupted);
+        }
+    }
+    Ok(Ended::Well)
+}
+
+fn chosen_rows(args: &TablesArgs) -> anyhow::Result<Vec<Row>> {
+    let listed = |extractor: &str, matcher| -> anyhow::Result<FeatureChoice> {
+        let mut choice = FeatureChoice::listed(extractor, matcher, &args.models)?;
+        choice.run.threads = 1;
+        Ok(choice)
+    };
+    let own = listed(&args.features.extractor, args.features.matcher.as_deref())?;
+    let mut rows = suite::rows(&own, &listed("sift", None)?)?;
+    if let Some(unknown) = args.rows.iter().find(|name| rows.iter().all(|r| r.name != name.as_str())) {
+        let names: Vec<&str> = rows.iter().map(|r| r.name).collect();
+        bail!("there is no row {unknown:?}; the rows are {}", names.join(", "));
+    }
+    rows.retain(|r| args.rows.is_empty() || args.rows.iter().any(|name| name == r.name));
+    Ok(rows)
+}
+
+fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
+    let preset = if args.quick { Amounts::QUICK } else { Amounts::FULL };
+    let amounts =
+        Amounts { headline: args.headline.unwrap_or(preset.headline), others: args.others.unwrap_or(preset.others) };
+    let header = Header::new(rows.iter().map(|r| (r.name.to_owned(), r.config())).collect());
+    let (store, done) = Store::open(&args.out, &header, args.shard)?;
+    let whole = Plan::new(rows, amounts, &[]);
+    let n_whole = whole.len();
+    let plan = whole.left(rows, &done, args.shard);
+    eprintln!("{} of {n_whole} episodes to run; results are kept in {}", plan.len(), args.out.display());
+    let style =
+        ProgressStyle::with_template("{bar:30} {pos}/{len} episodes  [{elapsed}, about {eta} left]  {wide_msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(plan.len() as u64).with_style(style);
+    let interrupted = interruption()?;
+    let options = RunOptions {
+        threads: args.threads,
+        commit: commit(),
+        clips: (!args.no_clips).then(|| ClipFolder(args.out.join("clips"))),
+    };
+    let tally = Mutex::new((0_usize, 0_usize));
+    suite::run(&plan, rows, &store, &options, &|record| {
+        say(&bar, &tally, record);
+        if interrupted.load(Ordering::Relaxed) { GoOn::No } else { GoOn::Yes }
+    })?;
+    bar.finish_and_clear();
+    if interrupted.load(Ordering::Relaxed) {
+        eprintln!("interrupted; the same command goes on where this one stopped");
+        return Ok(Ended::Interrupted);
+    }
+    Ok(Ended::Well)
+}
+
+fn say(bar: &ProgressBar, tally: &Mutex<(usize, usize)>, record: &EpisodeRecord) {
+    let mut tally = tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    tally.0 += usize::from(record.strict.success);
+    tally.1 += 1;
+    bar.inc(1);
+    let cause = record.cause.map_or("", |c| c.words());
+    bar.suspend(|| {
+        eprintln!(
+            "{:<17} {:<14} {:<16} {:<10} {} {:3} steps, SPL {:.2}, {:.2} m {:.1} deg left, {:.0} s  {cause}",
+            record.cell.row,
+            record.cell.set,
+            record.scene,
+            record.episode_id,
+            if record.strict.success { "won " } else { "lost" },
+            record.strict.steps,
+            record.strict.spl,
+            record.strict.final_distance_m,
+            record.strict.final_heading_error_deg,
+            record.wall_s,
+        );
+    });
+    bar.set_message(format!("{} of {} won", tally.0, tally.1));
+}
+
+/// True once the user wants it to end: the episodes that are under way end first.
+fn interruption() -> anyhow::Result<&'static AtomicBool> {
+    static ASKED: AtomicBool = AtomicBool::new(false);
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().build().context("cannot listen to signals")?;
+    std::thread::spawn(move || {
+        if runtime.block_on(tokio::signal::ctrl_c()).is_ok() {
+            ASKED.store(true, Ordering::Relaxed);
+            eprintln!("ending after the episodes that are under way; once more ends at once");
+            if runtime.block_on(tokio::signal::ctrl_c()).is_ok() {
+                std::process::exit(130);
+            }
+        }
+    });
+    Ok(&ASKED)
+}
+
+/// The sources' commit, `+` behind it where they were changed since.
+fn commit() -> String {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let git = Command::new("git")
+        .arg("-C")
+        .arg(sources)
+        .args(["describe", "--always", "--dirty=+", "--abbrev=10", "--exclude", "*"])
+        .output();
+    match git {
+        Ok(said) if said.status.success() => String::from_utf8_lossy(&said.stdout).trim().to_owned(),
+        _ => "unknown".to_owned(),
+    }
+}

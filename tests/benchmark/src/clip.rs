@@ -1,0 +1,193 @@
+//! A short recording of how an episode was lost: its last steps, and those with the goal in view, for the viewer.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use homing_core::{GoalEstimate, GoalPhoto, NavigationState, OccupancyGrid, Odometry, PlanarPose, RgbdFrame};
+use homing_monitor::{Recorder, RecorderConfig, RecorderError, Update};
+use homing_sim::arena::Arena;
+use homing_sim::episode::Episode;
+use thiserror::Error;
+
+use crate::RunError;
+use crate::cause::{Cause, is_in_view};
+use crate::episode::StepRecord;
+use crate::record::EpisodeRecord;
+
+/// Last steps kept.
+const LAST_STEPS: usize = 40;
+/// Steps kept with the goal in view, the first ones.
+const VIEW_STEPS: usize = 20;
+/// Longest time to write a clip.
+const WRITE_MAX: Duration = Duration::from_secs(60);
+
+/// Why a clip is missing.
+#[derive(Debug, Error)]
+pub enum ClipError {
+    /// Its folder cannot be made.
+    #[error("cannot make the folder {}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The recording cannot be begun.
+    #[error(transparent)]
+    Recorder(#[from] RecorderError),
+    /// The recording is not whole.
+    #[error("the clip {} is incomplete: {reason}", path.display())]
+    Incomplete {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Where clips go: `FOLDER/ROW/SET/SCENE-ID.rrd`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClipFolder(pub PathBuf);
+
+impl ClipFolder {
+    /// The clip of an episode, relative to the folder.
+    #[must_use]
+    pub fn name(record: &EpisodeRecord) -> PathBuf {
+        let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '.', "_");
+        let file = format!("{}-{}.rrd", plain(&record.scene), plain(&record.episode_id));
+        Path::new(&plain(&record.cell.row)).join(plain(&record.cell.set)).join(file)
+    }
+}
+
+#[derive(Debug)]
+struct Step {
+    frame: Arc<RgbdFrame>,
+    odometry: Odometry,
+    estimate: GoalEstimate,
+    state: NavigationState,
+    map: Arc<OccupancyGrid>,
+    truth_odom: PlanarPose,
+}
+
+/// The steps of one episode that would be shown if it failed.
+#[derive(Debug)]
+pub struct Clip {
+    arena: Arc<Arena>,
+    episode: Episode,
+    photo: GoalPhoto,
+    goal_odom: Option<PlanarPose>,
+    in_view: Vec<Step>,
+    last: VecDeque<Step>,
+}
+
+impl Clip {
+    /// Before the first step.
+    ///
+    /// # Errors
+    /// [`RunError::Camera`] for a goal camera that cannot be.
+    pub fn begin(arena: &Arc<Arena>, episode: &Episode) -> Result<Self, RunError> {
+        let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
+        let photo = GoalPhoto { id: 1, rgb, intrinsics: episode.camera.intrinsics()? };
+        Ok(Self {
+            arena: Arc::clone(arena),
+            episode: episode.clone(),
+            photo,
+            goal_odom: None,
+            in_view: Vec::new(),
+            last: VecDeque::new(),
+        })
+    }
+
+    /// Takes in one step.
+    pub fn see(&mut self, record: &StepRecord<'_>) {
+        self.goal_odom = Some(record.goal_odom_truth);
+        let step = Step {
+            frame: Arc::new(record.observation.frame.clone()),
+            odometry: record.observation.odometry,
+            estimate: record.estimate.clone(),
+            state: record.state.clone(),
+            map: Arc::new(record.map.clone()),
+            truth_odom: in_odom(self.episode.start.into(), record.pose_truth),
+        };
+        self.last.push_back(step);
+        if self.last.len() > LAST_STEPS
+            && let Some(step) = self.last.pop_front()
+            && self.in_view.len() < VIEW_STEPS
+            && is_in_view(&self.arena, &self.episode, in_world(self.episode.start.into(), step.truth_odom))
+        {
+            self.in_view.push(step);
+        }
+    }
+
+    /// Writes the recording of a failed episode.
+    ///
+    /// # Errors
+    /// [`ClipError`] when the file cannot be written whole.
+    pub fn write(self, folder: &ClipFolder, record: &EpisodeRecord, cause: Cause) -> Result<PathBuf, ClipError> {
+        let path = folder.0.join(ClipFolder::name(record));
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(|source| ClipError::Folder { path: parent.to_owned(), source })?;
+        }
+        let recorder = Recorder::new(RecorderConfig {
+            recording: Some(path.clone()),
+            // Steps are written as fast as they can be: none is thinned out.
+            image_rate_hz_max: 1e9,
+            jpeg_quality: 60,
+            robot_radius_m: self.arena.size().radius_m,
+            ..RecorderConfig::default()
+        })?;
+        let mut offered = 0;
+        let mut offer = |update: Update| {
+            recorder.offer(update);
+            offered += 1;
+            // The queue is bounded and lets go of what is old: wait for it rather than lose a step.
+            let deadline = Instant::now() + WRITE_MAX;
+            while recorder.status().shown < offered && Instant::now() < deadline {
+                std::thread::sleep(Duration::from_micros(200));
+            }
+        };
+        offer(self.photo.into());
+        if let Some(goal) = self.goal_odom {
+            offer(Update::TruthGoal(goal));
+        }
+        for step in self.in_view.into_iter().chain(self.last) {
+            let stamp = step.frame.stamp;
+            offer(step.odometry.into());
+            offer(Update::TruthPose { stamp, pose: step.truth_odom });
+            offer(step.frame.into());
+            offer(step.estimate.into());
+            offer(Update::Map(step.map));
+            offer(step.state.into());
+        }
+        let words = format!("# {}\n\n{}: {}", cause.words(), record.scene, record.reason);
+        offer(Update::Verdict(words));
+        let status = recorder.finish(WRITE_MAX);
+        match status.error() {
+            None if status.complete => Ok(path),
+            error => {
+                Err(ClipError::Incomplete { path, reason: error.unwrap_or("the recorder did not keep up").to_owned() })
+            }
+        }
+    }
+}
+
+fn in_odom(start: PlanarPose, pose: PlanarPose) -> PlanarPose {
+    let (dx, dy) = (pose.x_m - start.x_m, pose.y_m - start.y_m);
+    let (cos, sin) = (libm::cos(start.yaw_rad), libm::sin(start.yaw_rad));
+    PlanarPose {
+        x_m: cos * dx + sin * dy,
+        y_m: cos * dy - sin * dx,
+        yaw_rad: homing_core::wrap_angle(pose.yaw_rad - start.yaw_rad),
+    }
+}
+
+fn in_world(start: PlanarPose, pose: PlanarPose) -> PlanarPose {
+    let (cos, sin) = (libm::cos(start.yaw_rad), libm::sin(start.yaw_rad));
+    PlanarPose {
+        x_m: start.x_m + cos * pose.x_m - sin * pose.y_m,
+        y_m: start.y_m + sin * pose.x_m + cos * pose.y_m,
+        yaw_rad: homing_core::wrap_angle(start.yaw_rad + pose.yaw_rad),
+    }
+}

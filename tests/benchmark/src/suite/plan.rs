@@ -1,0 +1,172 @@
+//! What is run, and in which order: the cells of the tables fill evenly, so that a report can be made at any time.
+
+use std::collections::HashSet;
+
+use homing_sim::arena::SceneRef;
+use homing_sim::episode::{Level, Shape};
+
+use super::rows::{Headline, Row};
+use super::sets::{self, EpisodeRef};
+use super::store::Shard;
+use crate::record::{CellKey, EpisodeRecord};
+
+/// Episodes for each cell.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub struct Amounts {
+    /// Of a headline row, for each level.
+    pub headline: usize,
+    /// Of the other rows.
+    pub others: usize,
+}
+
+impl Amounts {
+    /// Enough for a report.
+    pub const FULL: Amounts = Amounts { headline: 100, others: 30 };
+    /// Enough to see that it works.
+    pub const QUICK: Amounts = Amounts { headline: 1, others: 1 };
+}
+
+/// One episode to run: the row by index, the set by name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    /// Index into the rows.
+    pub row: usize,
+    /// The set's name.
+    pub set: String,
+    /// The episode.
+    pub episode: EpisodeRef,
+}
+
+/// Everything to run, in order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// Tasks that share row and scene stand together: a scene is made ready once for them.
+    pub groups: Vec<Vec<Task>>,
+}
+
+/// Rounds in which the cells fill.
+const ROUNDS: usize = 4;
+
+impl Plan {
+    /// The folds on flats for all rows, and the sets of `more` for headline rows.
+    #[must_use]
+    pub fn new(rows: &[Row], amounts: Amounts, more: &[(String, Vec<EpisodeRef>)]) -> Self {
+        let mut groups = Vec::new();
+        for round in 0..ROUNDS {
+            for (index, row) in rows.iter().enumerate() {
+                let n = match row.headline {
+                    Headline::Yes => amounts.headline,
+                    Headline::No => amounts.others,
+                };
+                for (set, shape) in [("flats-curved", Shape::Curved), ("flats-straight", Shape::Straight)] {
+                    if shape == Shape::Straight && row.headline == Headline::No {
+                        continue;
+                    }
+                    let part = |level| share(&sets::flats(shape, level, n), round);
+                    let episodes: Vec<EpisodeRef> = Level::ALL[..3].iter().flat_map(|level| part(*level)).collect();
+                    groups.extend(by_scene(index, set, episodes));
+                }
+                if index == 0 {
+                    for (set, episodes) in more {
+                        groups.extend(by_scene(index, set, share(episodes, round)));
+                    }
+                }
+            }
+        }
+        Self { groups }
+    }
+
+    /// Without what is done, and without what other shards do.
+    #[must_use]
+    pub fn left(mut self, rows: &[Row], done: &[EpisodeRecord], shard: Shard) -> Self {
+        let done: HashSet<(&CellKey, &str)> = done.iter().map(|r| (&r.cell, r.episode_id.as_str())).collect();
+        let is_left = |task: &Task| {
+            let cell = CellKey { row: rows[task.row].name.to_owned(), set: task.set.clone() };
+            !done.contains(&(&cell, task.episode.id.as_str()))
+        };
+        let mut index = 0;
+        self.groups.retain_mut(|group| {
+            let mine = index % shard.of.max(1) == shard.index;
+            index += 1;
+            group.retain(is_left);
+            mine && !group.is_empty()
+        });
+        self
+    }
+
+    /// Episodes.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.groups.iter().map(Vec::len).sum()
+    }
+
+    /// Nothing to do.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+}
+
+/// A round's part of a list.
+fn share(episodes: &[EpisodeRef], round: usize) -> Vec<EpisodeRef> {
+    let at = |round: usize| episodes.len() * round / ROUNDS;
+    episodes[at(round)..at(round + 1)].to_vec()
+}
+
+fn by_scene(row: usize, set: &str, episodes: Vec<EpisodeRef>) -> Vec<Vec<Task>> {
+    let mut groups: Vec<(SceneRef, Vec<Task>)> = Vec::new();
+    for episode in episodes {
+        let scene = episode.scene.clone();
+        let task = Task { row, set: set.to_owned(), episode };
+        match groups.iter_mut().find(|(s, _)| *s == scene) {
+            Some((_, tasks)) => tasks.push(task),
+            None => groups.push((scene, vec![task])),
+        }
+    }
+    groups.into_iter().map(|(_, tasks)| tasks).collect()
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
+mod tests {
+    use homing_perception::onnx::FeatureChoice;
+
+    use super::*;
+    use crate::suite::rows::rows;
+
+    fn plan(amounts: Amounts) -> (Vec<Row>, Plan) {
+        let rows = rows(&FeatureChoice::default(), &FeatureChoice::default()).unwrap();
+        let plan = Plan::new(&rows, amounts, &[]);
+        (rows, plan)
+    }
+
+    #[test]
+    fn every_cell_gets_its_episodes_once() {
+        let (rows, plan) = plan(Amounts { headline: 9, others: 5 });
+        let tasks: Vec<&Task> = plan.groups.iter().flatten().collect();
+        let of = |row: &str, set: &str, level: Level| {
+            let index = rows.iter().position(|r| r.name == row).unwrap();
+            tasks.iter().filter(|t| t.row == index && t.set == set && t.episode.level == level).count()
+        };
+        assert_eq!(of("frontier", "flats-curved", Level::Hard), 9);
+        assert_eq!(of("frontier", "flats-straight", Level::Easy), 9);
+        assert_eq!(of("straight", "flats-curved", Level::Medium), 5);
+        assert_eq!(of("straight", "flats-straight", Level::Medium), 0);
+        let mut names: Vec<String> = tasks.iter().map(|t| format!("{} {} {}", t.row, t.set, t.episode.id)).collect();
+        names.sort();
+        let n = names.len();
+        names.dedup();
+        assert_eq!(names.len(), n, "an episode is planned twice");
+        for group in &plan.groups {
+            assert!(group.iter().all(|t| (t.row, &t.episode.scene) == (group[0].row, &group[0].episode.scene)));
+        }
+    }
+
+    #[test]
+    fn shards_share_the_work_and_leave_nothing() {
+        let (rows, whole) = plan(Amounts { headline: 9, others: 5 });
+        let parts: Vec<Plan> = (0..3).map(|index| whole.clone().left(&rows, &[], Shard { index, of: 3 })).collect();
+        assert_eq!(parts.iter().map(Plan::len).sum::<usize>(), whole.len());
+        assert!(parts.iter().all(|p| p.len() > whole.len() / 5));
+    }
+}

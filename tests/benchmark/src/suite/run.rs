@@ -1,0 +1,178 @@
+//! Runs what is left, on several threads, and keeps every episode as it ends.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use homing_perception::AnyEstimator;
+use homing_sim::Score;
+use homing_sim::arena::Arena;
+use thiserror::Error;
+
+use super::plan::{Plan, Task};
+use super::rows::Row;
+use super::store::{Store, StoreError};
+use crate::clip::{Clip, ClipError, ClipFolder};
+use crate::episode::run_episode;
+use crate::record::{CellKey, EpisodeRecord};
+use crate::{RunError, Trial, Watch};
+
+/// How to run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// Episodes side by side; 0 for one per core.
+    pub threads: usize,
+    /// The program's commit, kept with every episode.
+    pub commit: String,
+    /// Where clips of failed episodes go, if anywhere.
+    pub clips: Option<ClipFolder>,
+}
+
+/// Why a run ended before its end. What was done is kept.
+#[derive(Debug, Error)]
+pub enum SuiteError {
+    /// An episode could not be run.
+    #[error("{row}, {set}, {scene}, episode {id}: {source}")]
+    Episode {
+        /// The row.
+        row: String,
+        /// The set.
+        set: String,
+        /// The scene.
+        scene: String,
+        /// The episode.
+        id: String,
+        /// Why not.
+        source: RunError,
+    },
+    /// A result could not be kept.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A clip could not be written.
+    #[error(transparent)]
+    Clip(#[from] ClipError),
+    /// No worker threads.
+    #[error("no worker threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+/// Runs a plan. `progress` hears of every episode once it is kept; it says whether to go on.
+///
+/// # Errors
+/// [`SuiteError`] of the first thing that went wrong; other threads end their episode first.
+pub fn run(
+    plan: &Plan,
+    rows: &[Row],
+    store: &Store,
+    options: &RunOptions,
+    progress: &(dyn Fn(&EpisodeRecord) -> GoOn + Sync),
+) -> Result<(), SuiteError> {
+    let n_threads = match options.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    };
+    let next = AtomicUsize::new(0);
+    let failed: Mutex<Option<SuiteError>> = Mutex::new(None);
+    let worker = || {
+        while let Some(group) = plan.groups.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let ended = run_group(group, &rows[group[0].row], store, options, progress);
+            if !matches!(ended, Ok(GoOn::Yes)) {
+                next.store(usize::MAX / 2, Ordering::Relaxed);
+            }
+            if let Err(error) = ended {
+                failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..n_threads.clamp(1, plan.groups.len().max(1))).map(|_| scope.spawn(worker)).collect();
+        for w in workers {
+            w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        }
+    });
+    failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+}
+
+/// Whether a run goes on after an episode.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum GoOn {
+    /// It does.
+    Yes,
+    /// It ends, and can be gone on with later.
+    No,
+}
+
+fn run_group(
+    group: &[Task],
+    row: &Row,
+    store: &Store,
+    options: &RunOptions,
+    progress: &(dyn Fn(&EpisodeRecord) -> GoOn + Sync),
+) -> Result<GoOn, SuiteError> {
+    // A pool of its own keeps the renderer's work on this thread: whole episodes side by side use the cores better.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let failed = |task: &Task| {
+        let (set, id) = (task.set.clone(), task.episode.id.clone());
+        let scene = format!("{:?}", task.episode.scene);
+        move |source: RunError| SuiteError::Episode { row: row.name.to_owned(), set, scene, id, source }
+    };
+    let first = &group[0];
+    let opened = AnyEstimator::open(row.perception, &row.features).map_err(RunError::from);
+    let mut estimator = opened.map_err(failed(first))?;
+    let loaded = pool.install(|| Arena::load(&first.episode.scene, first.episode.body)).map_err(RunError::from);
+    let arena = Arc::new(loaded.map_err(failed(first))?);
+    for task in group {
+        let (record, clip) =
+            pool.install(|| run_task(task, row, &arena, &mut estimator, options)).map_err(failed(task))?;
+        if let (Some(folder), Some(clip), Some(cause)) = (&options.clips, clip, record.cause) {
+            clip.write(folder, &record, cause)?;
+        }
+        store.keep(&record)?;
+        if progress(&record) == GoOn::No {
+            return Ok(GoOn::No);
+        }
+    }
+    Ok(GoOn::Yes)
+}
+
+fn run_task(
+    task: &Task,
+    row: &Row,
+    arena: &Arc<Arena>,
+    estimator: &mut AnyEstimator,
+    options: &RunOptions,
+) -> Result<(EpisodeRecord, Option<Clip>), RunError> {
+    let start = Instant::now();
+    let episode = task.episode.episode(arena)?;
+    let mut trial: Trial = row.trial.clone();
+    trial.planner.body.radius_m = arena.size().radius_m;
+    let mut watch = Watch::default();
+    let mut clip = match options.clips {
+        Some(_) => Some(Clip::begin(arena, &episode)?),
+        None => None,
+    };
+    let run = run_episode(arena, &episode, estimator, &trial, &mut |record| {
+        watch.see(arena, &episode, record);
+        if let Some(clip) = &mut clip {
+            clip.see(record);
+        }
+    })?;
+    let strict = Score::strict(&run.finish);
+    let record = EpisodeRecord {
+        cell: CellKey { row: row.name.to_owned(), set: task.set.clone() },
+        scene: arena.scene().name.clone(),
+        episode_id: task.episode.id.clone(),
+        level: task.episode.level,
+        shape: episode.shape,
+        strict,
+        published: Score::published(&run.finish),
+        cause: (!strict.success).then(|| watch.cause(run.mode)),
+        reason: run.reason,
+        watch,
+        first_heading_rad: run.first_heading_rad,
+        times: run.times,
+        wall_s: start.elapsed().as_secs_f64(),
+        commit: options.commit.clone(),
+    };
+    Ok((record, clip))
+}
