@@ -25,6 +25,7 @@ homing-robot-node      -> core robot protocol
 homing-monitor-node    -> core monitor protocol privileged
 homing-sim-node        -> core sim safety protocol privileged
 homing-benchmark       -> core monitor perception planner sim
+homing-benchmark-planner -> core planner planner-node protocol sim
 homing                 -> core perception planner robot sim protocol privileged benchmark
 homing-tests           -> core perception planner safety robot sim protocol privileged benchmark
 ";

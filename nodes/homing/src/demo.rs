@@ -7,21 +7,22 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use homing_core::PlanarPose;
-use homing_privileged::{EPISODE_SUMMARY, GROUND_TRUTH, GroundTruth};
-use homing_protocol::convert::{EncodedPhoto, ToDomain};
-use homing_protocol::interfaces::homing_msgs::{self, EpisodeSummary};
+use homing_privileged::{EPISODE_SUMMARY, GroundTruth};
+use homing_protocol::convert::EncodedPhoto;
+use homing_protocol::interfaces::homing_msgs::EpisodeSummary;
 use homing_protocol::navigate::Outcome;
-use homing_protocol::session::{DEFAULT_ENDPOINT, Link, SessionConfig, SessionError};
-use homing_protocol::{Session, Subscription, topics};
+use homing_protocol::session::DEFAULT_ENDPOINT;
 use homing_sim::episode::{self, GoalPlace};
 use homing_sim::geodesic::GeodesicField;
-use homing_sim::{Arena, BodySize, Ending, Episode, EpisodeSpec, Finish, SceneRef, Score};
+use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, SceneRef};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::fleet::Fleet;
 use crate::latency::Stopwatch;
+use crate::meeting::{all_ready, join};
 use crate::mission::{self, Watched};
 use crate::run_folder::RunFolder;
+use crate::scorer::Scorer;
 use crate::settings::{
     FeatureArgs, MonitorFile, Network, PerceptionFile, PlannerFile, PlannerPace, SimFile, TruthFile,
 };
@@ -105,8 +106,8 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     }
     bar.set_message("starting four processes: body, perception, planner, monitor");
     let mut fleet = start(&args, &task, &folder, viewer)?;
-    let session = join(&args, &mut fleet).await?;
-    let mut scorer = Scorer { truths: session.subscribe(&GROUND_TRUTH, 64)?, last: None };
+    let session = join(&args.endpoint, &mut fleet).await?;
+    let mut scorer = Scorer::open(&session)?;
     let mut stopwatch = Stopwatch::open(&session)?;
     let summary = session.publisher(&EPISODE_SUMMARY)?;
     all_ready(&session, &mut fleet).await?;
@@ -131,7 +132,7 @@ pub async fn run(args: DemoArgs) -> anyhow::Result<Ended> {
     };
 
     scorer.hear_the_end(report.outcome == Outcome::Arrived).await;
-    let score = if args.goal.is_some() { None } else { scorer.score(&task)? };
+    let score = if args.goal.is_some() { None } else { scorer.score(&task.arena, &task.episode) };
     let about = About {
         scene: task.arena.scene().name.clone(),
         seed: args.seed,
@@ -252,48 +253,6 @@ fn viewer() -> anyhow::Result<PathBuf> {
         .context("no rerun viewer found: run ./deploy/demo once, or pip install rerun-sdk==0.36.3")
 }
 
-/// Joins the network as soon as the body listens.
-async fn join(args: &DemoArgs, fleet: &mut Fleet) -> anyhow::Result<Session> {
-    let mut config = SessionConfig::new("homing", Link::Connect(vec![args.endpoint.clone()]));
-    config.connect_timeout = Duration::from_secs(2);
-    for _ in 0..15 {
-        fail_on_loss(fleet)?;
-        match tokio::task::block_in_place(|| Session::open(&config)) {
-            Ok(session) => {
-                // Somebody answers: is it our body?
-                tokio::time::sleep(Duration::from_millis(300)).await;
-                fail_on_loss(fleet)?;
-                return Ok(session);
-            }
-            // Waiting does not make it an address.
-            Err(cause @ SessionError::Endpoint { .. }) => return Err(cause.into()),
-            Err(cause) => tracing::debug!(%cause, "not yet"),
-        }
-    }
-    bail!("the body does not listen on {} after 30 s", args.endpoint)
-}
-
-async fn all_ready(session: &Session, fleet: &mut Fleet) -> anyhow::Result<()> {
-    for _ in 0..300 {
-        fail_on_loss(fleet)?;
-        if session.has_sender(&topics::CAMERA_COLOR)
-            && session.has_sender(&topics::GOAL_ESTIMATE)
-            && session.has_sender(&topics::MOTION_COMMAND)
-        {
-            return Ok(());
-        }
-        tokio::time::sleep(Duration::from_millis(100)).await;
-    }
-    bail!("not all processes came up within 30 s; their logs are in the run's folder")
-}
-
-fn fail_on_loss(fleet: &mut Fleet) -> anyhow::Result<()> {
-    match fleet.loss() {
-        Some(loss) => bail!("{} ended at once ({}):\n{}", loss.name, loss.status, loss.last_words),
-        None => Ok(()),
-    }
-}
-
 /// Without perception the planner explores on; without body or planner there is nothing to wait for.
 fn still_possible(fleet: &mut Fleet, bar: &ProgressBar) -> anyhow::Result<()> {
     let Some(loss) = fleet.loss() else { return Ok(()) };
@@ -314,59 +273,6 @@ fn leave(fleet: &mut Fleet) {
     fleet.stop("perception", Duration::from_secs(3));
     fleet.stop("monitor", Duration::from_secs(25));
     fleet.stop("body", Duration::from_secs(3));
-}
-
-/// Hears the truth and scores the end.
-struct Scorer {
-    truths: Subscription<homing_msgs::GroundTruth>,
-    last: Option<GroundTruth>,
-}
-
-/// The truth of the last step comes after the step's result, once the body has looked again.
-const LAST_TRUTH_MAX: Duration = Duration::from_secs(5);
-/// Who gave up says nothing that marks an end: a pause does.
-const PAUSE: Duration = Duration::from_millis(300);
-
-impl Scorer {
-    /// Waits for the truth that belongs to the mission's end.
-    async fn hear_the_end(&mut self, arrived: bool) {
-        let limit = if arrived { LAST_TRUTH_MAX } else { PAUSE };
-        let began = tokio::time::Instant::now();
-        while began.elapsed() < limit {
-            self.listen();
-            if self.last.as_ref().is_some_and(|truth| truth.done) {
-                return;
-            }
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-        if arrived {
-            tracing::warn!(
-                "the body did not confirm within {LAST_TRUTH_MAX:?} that it stands; the score is that of the step before"
-            );
-        }
-    }
-
-    fn listen(&mut self) {
-        while let Some(received) = self.truths.try_recv() {
-            match received.map_err(anyhow::Error::from).and_then(|r| Ok(r.message.to_domain()?)) {
-                Ok(truth) => self.last = Some(truth),
-                Err(cause) => tracing::warn!("ignored: {cause:#}"),
-            }
-        }
-    }
-
-    fn score(&self, task: &Task) -> anyhow::Result<Option<Score>> {
-        let Some(truth) = &self.last else { return Ok(None) };
-        let ending = Ending {
-            stopped: truth.done,
-            steps: truth.steps,
-            last_mile_steps: 0,
-            path_length_m: truth.path_length_m,
-            collisions: truth.collisions,
-            pose: truth.pose,
-        };
-        Ok(Some(Score::strict(&Finish::new(&task.arena, &task.episode, &ending))))
-    }
 }
 
 fn message(verdict: &Verdict) -> EpisodeSummary {

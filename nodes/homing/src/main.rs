@@ -7,11 +7,13 @@ mod export_pairs;
 mod fleet;
 mod goto;
 mod latency;
+mod meeting;
 mod mission;
 mod models;
 mod photo;
 mod replay;
 mod run_folder;
+mod scorer;
 mod settings;
 mod verdict;
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use homing_core::{Action, Directive, DiscoveryView, GoalDiscovery, Motion, wrap_angle};
 
-use super::Truth;
+use super::in_world;
 use crate::arena::Arena;
 use crate::body::{Body, Sliding};
 use crate::constants::TURN_RAD;
@@ -17,18 +17,17 @@ use crate::geodesic::{GeodesicField, GoalBlocked};
 pub struct OracleDiscovery {
     arena: Arc<Arena>,
     field: GeodesicField,
-    goal_yaw_rad: f64,
-    truth: Truth,
+    episode: Episode,
 }
 
 impl OracleDiscovery {
-    /// For one episode. `truth` is told the robot's pose before each decision.
+    /// For one episode.
     ///
     /// # Errors
     /// [`GoalBlocked`] for a goal that the robot cannot reach.
-    pub fn new(arena: &Arc<Arena>, episode: &Episode, truth: Truth) -> Result<Self, GoalBlocked> {
+    pub fn new(arena: &Arc<Arena>, episode: &Episode) -> Result<Self, GoalBlocked> {
         let field = GeodesicField::to(arena.space(), (episode.goal.x_m, episode.goal.y_m))?;
-        Ok(Self { arena: Arc::clone(arena), field, goal_yaw_rad: episode.goal.yaw_rad, truth })
+        Ok(Self { arena: Arc::clone(arena), field, episode: episode.clone() })
     }
 }
 
@@ -39,8 +38,8 @@ impl GoalDiscovery for OracleDiscovery {
 
     fn reset(&mut self) {}
 
-    fn next(&mut self, _view: &DiscoveryView<'_>) -> Directive {
-        let pose = self.truth.pose();
+    fn next(&mut self, view: &DiscoveryView<'_>) -> Directive {
+        let pose = in_world(&self.episode, &view.pose);
         let body = Body { pose, radius_m: self.arena.size().radius_m, sliding: Sliding::Off };
         match next_motion(&body, self.arena.grid(), &self.field) {
             Some(Motion::Forward { .. }) => Directive::Act(Action::Forward),
@@ -54,7 +53,7 @@ impl GoalDiscovery for OracleDiscovery {
 impl OracleDiscovery {
     /// At the goal's place: perception sees the photo's view once the robot looks its way.
     fn face_the_goal(&self, yaw_rad: f64) -> Directive {
-        let left_rad = wrap_angle(self.goal_yaw_rad - yaw_rad);
+        let left_rad = wrap_angle(self.episode.goal.yaw_rad - yaw_rad);
         if left_rad.abs() <= 0.5 * TURN_RAD + 1e-6 {
             return Directive::Act(Action::Hold);
         }
@@ -65,7 +64,7 @@ impl OracleDiscovery {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
 mod tests {
-    use homing_core::{GridGeometry, OccupancyGrid, PlanarPose, Resettable, RobotBridge};
+    use homing_core::{GridGeometry, OccupancyGrid, Resettable, RobotBridge};
 
     use super::*;
     use crate::arena::{BodySize, SceneRef};
@@ -80,15 +79,13 @@ mod tests {
         let episode = draw(&arena, 5, &EpisodeSpec::default()).unwrap();
         let mut robot = Simulator::new(Arc::clone(&arena), SimConfig::default()).unwrap();
         robot.reset(&episode).unwrap();
-        let truth = Truth::default();
-        let mut oracle = OracleDiscovery::new(&arena, &episode, truth.clone()).unwrap();
+        let mut oracle = OracleDiscovery::new(&arena, &episode).unwrap();
         let geometry = GridGeometry { width: 1, height: 1, resolution_m: 1.0, origin_x_m: 0.0, origin_y_m: 0.0 };
         let map = OccupancyGrid::unknown(geometry);
         for step in 0..300 {
-            truth.tell(robot.pose_truth());
             let view = DiscoveryView {
                 step,
-                pose: PlanarPose::default(),
+                pose: robot.odometry().t_odom_base.planar(),
                 map: &map,
                 travel_m: &[0.0],
                 last_motion: None,

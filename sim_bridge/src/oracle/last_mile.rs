@@ -1,10 +1,13 @@
 //! Oracle-LM-Pose and Oracle-LP: the last mile with a perfect displacement, and with a perfect local policy (SLING 4.2).
 
-use homing_core::{Base, Camera, GoalEstimate, Odom, PlanarPose, Sighting, Transform};
+use homing_core::{Base, Camera, GoalEstimate, PlanarPose, Sighting, Transform};
 use nalgebra::Matrix6;
 
+use super::in_world;
 use crate::arena::Arena;
+use crate::episode::Episode;
 use crate::geodesic::GeodesicField;
+use crate::scene::World;
 
 /// Matches that a perfect estimate claims: more than any switch asks for.
 const N_INLIERS: usize = 300;
@@ -14,19 +17,19 @@ const VARIANCE: f64 = 1e-6;
 const LANDING_M: f64 = 1.0;
 
 /// Oracle-LM-Pose: wherever perception finds a goal at all, its finding becomes the true displacement. Whether it finds one
-/// stays perception's own doing.
+/// stays perception's own doing. `pose_odom` is the base where the estimate's image was taken.
 #[must_use]
 pub fn perfect(
     mut estimate: GoalEstimate,
-    pose: PlanarPose,
-    goal: PlanarPose,
+    episode: &Episode,
+    pose_odom: &PlanarPose,
     t_base_camera: &Transform<Base, Camera>,
 ) -> GoalEstimate {
     if matches!(estimate.sighting, Sighting::NotSeen { .. }) {
         return estimate;
     }
-    let (t_world_base, t_world_goal): (Transform<Odom, Base>, Transform<Odom, Base>) =
-        (pose.to_transform(), goal.to_transform());
+    let (t_world_base, t_world_goal): (Transform<World, Base>, Transform<World, Base>) =
+        (in_world(episode, pose_odom).to_transform(), PlanarPose::from(episode.goal).to_transform());
     let camera = t_base_camera.isometry();
     let t_camera_goal = camera.inverse() * t_world_base.isometry().inverse() * t_world_goal.isometry() * camera;
     estimate.sighting = Sighting::Pose {
@@ -59,7 +62,7 @@ mod tests {
 
     use super::*;
     use crate::arena::{BodySize, SceneRef};
-    use crate::episode::Viewpoint;
+    use crate::episode::{EpisodeSpec, FloorPose, Viewpoint, draw};
     use crate::flat::Detail;
 
     fn estimate(sighting: Sighting) -> GoalEstimate {
@@ -76,19 +79,28 @@ mod tests {
     #[test]
     fn a_finding_becomes_the_truth_and_nothing_found_stays_so() {
         let mount = Viewpoint::default().t_base_camera();
-        let (pose, goal) = (
-            PlanarPose { x_m: 1.0, y_m: 2.0, yaw_rad: core::f64::consts::FRAC_PI_2 },
-            PlanarPose { x_m: 1.0, y_m: 5.0, yaw_rad: core::f64::consts::FRAC_PI_2 },
-        );
+        let north = core::f64::consts::FRAC_PI_2;
+        let episode = Episode {
+            start: FloorPose { x_m: 1.0, y_m: 1.0, yaw_rad: north },
+            goal: FloorPose { x_m: 1.0, y_m: 5.0, yaw_rad: north },
+            ..an_episode()
+        };
+        // A metre ahead of the start.
+        let pose = PlanarPose { x_m: 1.0, y_m: 0.0, yaw_rad: 0.0 };
         let found = Sighting::Bearing { bearing_rad: 1.0, bearing_sd_rad: 0.1, heading_rad: 0.0, n_inliers: 9 };
-        let Sighting::Pose { t_camera_goal, .. } = perfect(estimate(found), pose, goal, &mount).sighting else {
+        let Sighting::Pose { t_camera_goal, .. } = perfect(estimate(found), &episode, &pose, &mount).sighting else {
             unreachable!("a pose")
         };
         // Three metres straight ahead of a camera that looks the same way.
         let p = t_camera_goal.translation();
         assert!(p.x.abs() < 1e-9 && p.y.abs() < 1e-9 && (p.z - 3.0).abs() < 1e-9, "{p}");
         let unseen = Sighting::NotSeen { reason: UnseenReason::TooFewMatches };
-        assert_eq!(perfect(estimate(unseen.clone()), pose, goal, &mount).sighting, unseen);
+        assert_eq!(perfect(estimate(unseen.clone()), &episode, &pose, &mount).sighting, unseen);
+    }
+
+    fn an_episode() -> Episode {
+        let arena = Arena::load_as(&SceneRef::Flat { seed: 5 }, BodySize::default(), Detail::Shape).unwrap();
+        draw(&arena, 5, &EpisodeSpec::default()).unwrap()
     }
 
     #[test]

@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let trial = Trial { policy, ..Trial::default() };
     let run = run_episode(&arena, &episode, &mut estimator, &trial, &mut |r| {
         print_step(&arena, &episode, r);
-        let sighted = sighted_pose(r).zip(right_pose(r));
+        let sighted = sighted_pose(&r.moment()).zip(right_pose(&r.moment()));
         if has("frames") || (has("wrong") && sighted.is_some_and(|(_, right)| !right)) {
             let name = folder.join(format!("step{:03}.png", r.state.step));
             if let Err(cause) = save_matches(r, &photo, &name) {
@@ -79,7 +79,8 @@ fn print_step(arena: &Arena, episode: &Episode, r: &StepRecord<'_>) {
         Sighting::NotSeen { reason } => format!("{reason:?}({})", r.estimate.n_matches),
         Sighting::Bearing { n_inliers, .. } => format!("bearing({n_inliers}/{})", r.estimate.n_matches),
         Sighting::Pose { n_inliers, .. } => {
-            let error = sighted_pose(r).map_or(0.0, |p| p.distance_to(r.goal_odom_truth.x_m, r.goal_odom_truth.y_m));
+            let error =
+                sighted_pose(&r.moment()).map_or(0.0, |p| p.distance_to(r.goal_odom_truth.x_m, r.goal_odom_truth.y_m));
             format!("POSE({n_inliers}/{}) off {error:.2} m", r.estimate.n_matches)
         }
     };

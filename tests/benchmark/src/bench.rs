@@ -95,7 +95,8 @@ fn run_seed(
     let episode = episode::draw(&arena, seed, &options.spec)?;
     let mut watch = Watch::default();
     let trial = Trial { policy: options.policy, planner: options.planner.clone(), ..Trial::default() };
-    let run = run_episode(&arena, &episode, estimator, &trial, &mut |record| watch.see(&arena, &episode, record))?;
+    let run =
+        run_episode(&arena, &episode, estimator, &trial, &mut |record| watch.see(&arena, &episode, &record.moment()))?;
     let score = Score::strict(&run.finish);
     let row =
         EpisodeRow { seed, cause: (!score.success).then(|| watch.cause(run.mode)), score, reason: run.reason, watch };

@@ -1,11 +1,30 @@
 //! Why an episode failed, judged from what really was.
 
-use homing_core::{Mode, PlanarPose, Sighting, wrap_angle};
+use homing_core::{
+    Base, Camera, GoalEstimate, Mode, Motion, NavigationState, Odom, PlanarPose, Sighting, Transform, wrap_angle,
+};
 use homing_sim::arena::Arena;
 use homing_sim::episode::{Episode, in_sight};
 use serde::{Deserialize, Serialize};
 
-use crate::episode::StepRecord;
+/// What a step has to do with the truth.
+#[derive(Copy, Clone, Debug)]
+pub struct Moment<'a> {
+    /// Where the robot believes it is.
+    pub t_odom_base: Transform<Odom, Base>,
+    /// Where the camera sits on the body.
+    pub t_base_camera: Transform<Base, Camera>,
+    /// What perception said.
+    pub estimate: &'a GoalEstimate,
+    /// What the planner decided and why.
+    pub state: &'a NavigationState,
+    /// The motion sent to the body; a stop at the end.
+    pub motion: Motion,
+    /// Where the robot really is, world frame. Ground truth.
+    pub pose_truth: PlanarPose,
+    /// Where the photo was really taken, odometry frame. Ground truth.
+    pub goal_odom_truth: PlanarPose,
+}
 
 /// The goal is in view from within this distance, metres, ...
 pub const VIEW_M: f64 = 5.0;
@@ -78,7 +97,7 @@ pub struct Watch {
 
 impl Watch {
     /// Takes in one step.
-    pub fn see(&mut self, arena: &Arena, episode: &Episode, record: &StepRecord<'_>) {
+    pub fn see(&mut self, arena: &Arena, episode: &Episode, record: &Moment<'_>) {
         self.n_steps += 1;
         let view = is_in_view(arena, episode, record.pose_truth);
         if view {
@@ -101,7 +120,7 @@ impl Watch {
             let misled = record.state.goal.as_ref().is_some_and(|g| !agrees(&g.pose, &record.goal_odom_truth));
             self.n_misled += u64::from(misled);
         }
-        self.n_turns += u64::from(matches!(record.motion, homing_core::Motion::Turn { .. }));
+        self.n_turns += u64::from(matches!(record.motion, Motion::Turn { .. }));
     }
 
     /// Why an episode failed that ended in `mode`.
@@ -131,19 +150,19 @@ pub fn is_in_view(arena: &Arena, episode: &Episode, pose: PlanarPose) -> bool {
 
 /// Whether the pose that perception named is right; `None` if it named none.
 #[must_use]
-pub fn right_pose(record: &StepRecord<'_>) -> Option<bool> {
+pub fn right_pose(record: &Moment<'_>) -> Option<bool> {
     sighted_pose(record).map(|pose| agrees(&pose, &record.goal_odom_truth))
 }
 
 /// The goal that perception named, as a pose of the base in the odometry frame.
 #[must_use]
-pub fn sighted_pose(record: &StepRecord<'_>) -> Option<PlanarPose> {
+pub fn sighted_pose(record: &Moment<'_>) -> Option<PlanarPose> {
     let Sighting::Pose { t_camera_goal, .. } = &record.estimate.sighting else { return None };
-    let goal = record.observation.odometry.t_odom_base.isometry()
+    let goal = record.t_odom_base.isometry()
         * record.t_base_camera.isometry()
         * t_camera_goal.isometry()
         * record.t_base_camera.inverse().isometry();
-    Some(homing_core::Transform::<homing_core::Odom, homing_core::Base>::new(goal).planar())
+    Some(Transform::<Odom, Base>::new(goal).planar())
 }
 
 fn agrees(pose: &PlanarPose, truth: &PlanarPose) -> bool {

@@ -11,11 +11,12 @@ use homing_perception::AnyEstimator;
 use homing_planner::{Mission, Perception, Planner, PlannerObservation, StepEvent};
 use homing_sim::arena::Arena;
 use homing_sim::episode::{Episode, t_world_base};
-use homing_sim::oracle::{Truth, landing, perfect};
+use homing_sim::oracle::{landing, perfect};
 use homing_sim::score::Finish;
 use homing_sim::simulator::Simulator;
 use serde::{Deserialize, Serialize};
 
+use crate::cause::Moment;
 use crate::{GoalPose, LastMile, RunError, Trial};
 
 /// Names the goal photo of every episode.
@@ -42,6 +43,22 @@ pub struct StepRecord<'a> {
     pub pose_truth: PlanarPose,
     /// Where the photo was really taken, odometry frame. Ground truth.
     pub goal_odom_truth: PlanarPose,
+}
+
+impl StepRecord<'_> {
+    /// What the step has to do with the truth.
+    #[must_use]
+    pub fn moment(&self) -> Moment<'_> {
+        Moment {
+            t_odom_base: self.observation.odometry.t_odom_base,
+            t_base_camera: self.t_base_camera,
+            estimate: self.estimate,
+            state: self.state,
+            motion: self.motion,
+            pose_truth: self.pose_truth,
+            goal_odom_truth: self.goal_odom_truth,
+        }
+    }
 }
 
 /// Time spent, summed over the steps of an episode. Read for reporting alone: no decision depends on it.
@@ -101,8 +118,6 @@ struct Lockstep<'a> {
     trial: &'a Trial,
     arena: &'a Arc<Arena>,
     episode: &'a Episode,
-    /// What oracles are told.
-    truth: Truth,
     goal_odom_truth: PlanarPose,
     mission: Option<Mission>,
     motion: Option<MotionOutcome>,
@@ -120,13 +135,12 @@ impl<'a> Lockstep<'a> {
         trial: &'a Trial,
     ) -> Result<Self, RunError> {
         let mut robot = Simulator::new(Arc::clone(arena), trial.sim.clone())?;
-        let truth = Truth::default();
         robot.reset(episode)?;
         let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
         estimator.set_goal(GoalPhoto { id: GOAL_ID, rgb, intrinsics: episode.camera.intrinsics()? })?;
         let t_world_goal: Transform<_, Base> = t_world_base(arena, episode.goal.into());
         Ok(Self {
-            planner: Planner::new(trial.planner.clone(), trial.policy.build(arena, episode, &truth)?)?,
+            planner: Planner::new(trial.planner.clone(), trial.policy.build(arena, episode)?)?,
             goal_odom_truth: (robot.t_world_odom_truth().inverse() * t_world_goal).planar(),
             mission: Some(Mission::Start { goal_id: GOAL_ID }),
             motion: None,
@@ -139,7 +153,6 @@ impl<'a> Lockstep<'a> {
             trial,
             arena,
             episode,
-            truth,
         })
     }
 
@@ -150,7 +163,6 @@ impl<'a> Lockstep<'a> {
         let observed = Instant::now();
         let estimate = self.estimate(&observation)?;
         let event = self.event(&observation, &estimate);
-        self.truth.tell(self.robot.pose_truth());
         let asked = Instant::now();
         let action = self.planner.step(observation.odometry.stamp, &event);
         self.count_time(observed - start, &estimate, asked.elapsed());
@@ -182,8 +194,8 @@ impl<'a> Lockstep<'a> {
             GoalPose::Estimated => estimate,
             GoalPose::Oracle => perfect(
                 estimate,
-                self.robot.pose_truth(),
-                self.episode.goal.into(),
+                self.episode,
+                &observation.odometry.t_odom_base.planar(),
                 &self.robot.capabilities().t_base_camera,
             ),
         })
@@ -191,15 +203,10 @@ impl<'a> Lockstep<'a> {
 
     fn note_last_mile(&mut self) {
         let state = self.planner.state();
-        if !matches!(state.mode, Mode::Exploit | Mode::Align) {
-            return;
-        }
-        self.last_mile_steps += 1;
-        if let (None, Some(goal)) = (self.first_heading_rad, &state.goal) {
-            let (believed, truth) = (goal.pose, self.robot.pose_truth());
-            let goal_truth = (self.episode.goal.x_m, self.episode.goal.y_m);
-            self.first_heading_rad =
-                Some((state.pose.bearing_to(believed.x_m, believed.y_m), truth.bearing_to(goal_truth.0, goal_truth.1)));
+        if matches!(state.mode, Mode::Exploit | Mode::Align) {
+            self.last_mile_steps += 1;
+            let headings = || headings(state, &self.robot.pose_truth(), self.episode);
+            self.first_heading_rad = self.first_heading_rad.or_else(headings);
         }
     }
 
@@ -261,6 +268,15 @@ impl<'a> Lockstep<'a> {
             times: self.times,
         }
     }
+}
+
+/// Heading of the goal's place from the robot, radians, left positive: as the planner believes, and in truth. `None` while
+/// it believes in no goal.
+#[must_use]
+pub fn headings(state: &NavigationState, pose_truth: &PlanarPose, episode: &Episode) -> Option<(f64, f64)> {
+    let believed = state.goal.as_ref()?.pose;
+    let bearing_rad = state.pose.bearing_to(believed.x_m, believed.y_m);
+    Some((bearing_rad, pose_truth.bearing_to(episode.goal.x_m, episode.goal.y_m)))
 }
 
 fn ended(mode: Mode, action: Action) -> bool {

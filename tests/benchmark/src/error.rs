@@ -39,6 +39,9 @@ pub enum RunError {
     /// The goal is in no place that the robot can reach.
     #[error("the goal cannot be reached: {0}")]
     Goal(#[from] GoalBlocked),
+    /// The processes that an episode was to run through failed.
+    #[error("through processes: {0}")]
+    Processes(Box<dyn core::error::Error + Send + Sync>),
     /// Recorded frames cannot be read.
     #[error("recorded frames: {0}")]
     Recording(Box<dyn core::error::Error + Send + Sync>),

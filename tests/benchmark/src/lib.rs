@@ -19,7 +19,7 @@ pub mod trial;
 pub mod visual_target;
 
 pub use bench::{BenchOptions, bench};
-pub use cause::{Cause, Watch};
+pub use cause::{Cause, Moment, Watch};
 pub use episode::{EpisodeRun, StepRecord, run_episode};
 pub use error::RunError;
 pub use record::{CellKey, EpisodeRecord};

@@ -6,7 +6,7 @@ use homing_core::GoalDiscovery;
 use homing_planner::{Frontier, PlannerConfig, RandomGoal, Straight};
 use homing_sim::arena::Arena;
 use homing_sim::episode::Episode;
-use homing_sim::oracle::{OracleDiscovery, Truth};
+use homing_sim::oracle::OracleDiscovery;
 use homing_sim::simulator::SimConfig;
 use serde::{Deserialize, Serialize};
 
@@ -28,21 +28,16 @@ pub enum Policy {
 }
 
 impl Policy {
-    /// A fresh policy for one episode; `truth` is told where the robot is before each decision.
+    /// A fresh policy for one episode.
     ///
     /// # Errors
     /// [`RunError::Goal`] when an oracle is to lead to a goal that cannot be reached.
-    pub fn build(
-        self,
-        arena: &Arc<Arena>,
-        episode: &Episode,
-        truth: &Truth,
-    ) -> Result<Box<dyn GoalDiscovery>, RunError> {
+    pub fn build(self, arena: &Arc<Arena>, episode: &Episode) -> Result<Box<dyn GoalDiscovery>, RunError> {
         Ok(match self {
             Policy::Straight => Box::new(Straight::new()),
             Policy::Frontier => Box::new(Frontier::default()),
-            Policy::RandomGoal => Box::new(RandomGoal::new(episode.seed)),
-            Policy::Oracle => Box::new(OracleDiscovery::new(arena, episode, truth.clone())?),
+            Policy::RandomGoal => Box::new(RandomGoal::new(0)),
+            Policy::Oracle => Box::new(OracleDiscovery::new(arena, episode)?),
         })
     }
 }

@@ -3,6 +3,7 @@
 mod configuration;
 mod navigation;
 mod perception;
+mod processes;
 mod recorded;
 mod tables;
 mod visual_target;

@@ -6,15 +6,19 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, bail};
-use clap::Args;
-use homing_benchmark::EpisodeRecord;
+use clap::{Args, ValueEnum};
 use homing_benchmark::clip::ClipFolder;
 use homing_benchmark::suite::run::GoOn;
-use homing_benchmark::suite::{self, Amounts, Header, Plan, Row, RunOptions, Shard, Store};
+use homing_benchmark::suite::{
+    self, Amounts, Course, Header, InProcess, LayCourse, Plan, Row, RunOptions, Shard, Store,
+};
+use homing_benchmark::{EpisodeRecord, RunError};
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::onnx::registry::FOLDER;
+use homing_sim::episode::Level;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::processes::Processes;
 use crate::Ended;
 use crate::settings::FeatureArgs;
 
@@ -50,12 +54,46 @@ pub struct TablesArgs {
     /// Episodes side by side; 0 for one per core.
     #[arg(long, default_value_t = 0)]
     threads: usize,
+    /// Through body, perception and planner as processes of their own over zenoh, instead of in this one: the same actions
+    /// and scores, slower.
+    #[arg(long)]
+    through_processes: bool,
+    /// Only this difficulty; may be given several times.
+    #[arg(long = "level", value_enum, value_name = "LEVEL")]
+    levels: Vec<LevelName>,
+    /// Only this set of episodes; may be given several times.
+    #[arg(long = "set", value_name = "NAME")]
+    sets: Vec<String>,
     /// No recordings of failed episodes.
     #[arg(long)]
     no_clips: bool,
     /// Run nothing; write the report of what there is.
     #[arg(long)]
     report: bool,
+}
+
+/// Difficulties.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, ValueEnum)]
+enum LevelName {
+    /// Shortest path 1.5 to 3 m.
+    Easy,
+    /// 3 to 5 m.
+    Medium,
+    /// 5 to 10 m.
+    Hard,
+    /// Above 10 m.
+    Extra,
+}
+
+impl LevelName {
+    fn level(self) -> Level {
+        match self {
+            LevelName::Easy => Level::Easy,
+            LevelName::Medium => Level::Medium,
+            LevelName::Hard => Level::Hard,
+            LevelName::Extra => Level::Extra,
+        }
+    }
 }
 
 fn shard(text: &str) -> Result<Shard, String> {
@@ -101,7 +139,11 @@ fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
         Amounts { headline: args.headline.unwrap_or(preset.headline), others: args.others.unwrap_or(preset.others) };
     let header = Header::new(rows.iter().map(|r| (r.name.to_owned(), r.config())).collect());
     let (store, done) = Store::open(&args.out, &header, args.shard)?;
-    let whole = Plan::new(rows, amounts, &[]);
+    let mut whole = Plan::new(rows, amounts, &[]);
+    whole.keep(|task| {
+        (args.levels.is_empty() || args.levels.iter().any(|l| l.level() == task.episode.level))
+            && (args.sets.is_empty() || args.sets.contains(&task.set))
+    });
     let n_whole = whole.len();
     let plan = whole.left(rows, &done, args.shard);
     eprintln!("{} of {n_whole} episodes to run; results are kept in {}", plan.len(), args.out.display());
@@ -111,12 +153,18 @@ fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
     let bar = ProgressBar::new(plan.len() as u64).with_style(style);
     let interrupted = interruption()?;
     let options = RunOptions {
-        threads: args.threads,
+        // Processes side by side would take each other's cores, and lockstep waits for the slowest.
+        threads: if args.through_processes { 1 } else { args.threads },
         commit: commit(),
         clips: (!args.no_clips).then(|| ClipFolder(args.out.join("clips"))),
     };
     let tally = Mutex::new((0_usize, 0_usize));
-    suite::run(&plan, rows, &store, &options, &|record| {
+    let processes = |row: &Row| -> Result<Box<dyn Course>, RunError> {
+        Ok(Box::new(Processes::new(row, &args.features, args.out.join("processes"))?))
+    };
+    let in_process = |row: &Row| -> Result<Box<dyn Course>, RunError> { Ok(Box::new(InProcess::new(row)?)) };
+    let lay: LayCourse<'_> = if args.through_processes { &processes } else { &in_process };
+    suite::run(&plan, rows, &store, &options, lay, &|record| {
         say(&bar, &tally, record);
         if interrupted.load(Ordering::Relaxed) { GoOn::No } else { GoOn::Yes }
     })?;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use homing_core::GoalDiscovery;
-use homing_planner::{Frontier, PlannerConfig, Straight};
+use homing_planner::{Frontier, PlannerConfig, RandomGoal, Straight};
 use homing_protocol::process::SessionSettings;
 use serde::Deserialize;
 
@@ -34,6 +34,8 @@ pub enum Policy {
     /// To the edges of what is known.
     #[default]
     Frontier,
+    /// To places drawn at random from the map.
+    RandomGoal,
 }
 
 impl Policy {
@@ -42,6 +44,7 @@ impl Policy {
         match self {
             Policy::Straight => Box::new(Straight::new()),
             Policy::Frontier => Box::new(Frontier::default()),
+            Policy::RandomGoal => Box::new(RandomGoal::new(0)),
         }
     }
 }
@@ -117,18 +120,22 @@ impl Default for PaceSettings {
 }
 
 impl PaceSettings {
+    /// Longest wait for perception.
     pub fn answer_max(&self) -> Duration {
         Duration::from_millis(self.answer_ms_max)
     }
 
+    /// Time after which a command is sent again.
     pub fn resend(&self) -> Duration {
         Duration::from_millis(self.resend_ms.max(10))
     }
 
+    /// Time after which a command is given up.
     pub fn result_max(&self) -> Duration {
         Duration::from_millis(self.result_ms_max)
     }
 
+    /// Time after which a command is void.
     pub fn time_to_live(&self) -> Duration {
         Duration::from_millis(self.time_to_live_ms)
     }

@@ -8,6 +8,7 @@ use homing_protocol::convert::{EncodedPhoto, ToDomain, ToMessage, to_camera_moun
 use homing_protocol::navigate::{Mission, MissionId, MissionReport, NavigateServer, Outcome, Progress};
 use homing_protocol::{Session, topics};
 
+use crate::Correction;
 use crate::config::Config;
 use crate::links::Links;
 use crate::moment::Moments;
@@ -43,6 +44,7 @@ pub struct Driver {
     misses: u32,
     /// The stop that ended the last mission, until the body confirms it.
     closing: Option<Outstanding>,
+    correction: Option<Correction>,
 }
 
 /// The mission under way.
@@ -72,7 +74,13 @@ enum Answering {
 }
 
 impl Driver {
-    pub fn new(planner: Planner, config: Config, links: Links, missions: NavigateServer) -> Self {
+    pub fn new(
+        planner: Planner,
+        config: Config,
+        links: Links,
+        missions: NavigateServer,
+        correction: Option<Correction>,
+    ) -> Self {
         Self {
             planner,
             config,
@@ -87,6 +95,7 @@ impl Driver {
             perception: Answering::InTime,
             misses: 0,
             closing: None,
+            correction,
         }
     }
 
@@ -263,9 +272,13 @@ impl Driver {
         active.path_length_m += motion.map_or(0.0, |m| m.moved.distance_to(0.0, 0.0));
         // The newest answer speaks of the moment at hand, those before of what was seen long ago.
         let mut remembered = self.moments.close(stamp);
+        let mut estimate = remembered.pop();
+        if let Some(correction) = &self.correction {
+            estimate = estimate.map(|e| correction(e, &observation));
+        }
         let event = StepEvent {
             mission: self.announced.take(),
-            estimate: remembered.pop(),
+            estimate,
             remembered,
             observation: Some(observation),
             motion,

@@ -3,12 +3,14 @@
 //! [`rows`] says what is tried, [`sets`] on which episodes, [`plan`] how many of each and in which order. [`run`] runs what
 //! a [`store`] does not hold yet; [`crate::tables`] makes the report of what it holds.
 
+pub mod course;
 pub mod plan;
 pub mod rows;
 pub mod run;
 pub mod sets;
 pub mod store;
 
+pub use course::{Course, InProcess, LayCourse, Onlooker};
 pub use plan::{Amounts, Plan, Task};
 pub use rows::{Row, rows};
 pub use run::{RunOptions, run};

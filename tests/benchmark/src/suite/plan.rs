@@ -76,6 +76,14 @@ impl Plan {
         Self { groups }
     }
 
+    /// Only the tasks that are wanted.
+    pub fn keep(&mut self, is_wanted: impl Fn(&Task) -> bool) {
+        self.groups.retain_mut(|group| {
+            group.retain(&is_wanted);
+            !group.is_empty()
+        });
+    }
+
     /// Without what is done, and without what other shards do.
     #[must_use]
     pub fn left(mut self, rows: &[Row], done: &[EpisodeRecord], shard: Shard) -> Self {

@@ -1,7 +1,7 @@
 //! The rows of the tables: what is tried, by name.
 
 use homing_perception::PerceptionConfig;
-use homing_perception::onnx::FeatureChoice;
+use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice};
 
 use crate::{GoalPose, LastMile, Policy, RunError, Trial};
 
@@ -28,7 +28,7 @@ impl Row {
     pub fn config(&self) -> serde_json::Value {
         serde_json::json!({
             "what": self.what,
-            "features": format!("{:?}", self.features),
+            "features": described(&self.features),
             "perception": format!("{:?}", self.perception),
             "policy": self.trial.policy,
             "planner": format!("{:?}", self.trial.planner),
@@ -37,6 +37,25 @@ impl Row {
             "last_mile": self.trial.last_mile,
         })
     }
+}
+
+/// Features by name and content, wherever their files lie.
+fn described(features: &FeatureChoice) -> serde_json::Value {
+    let extractor = match &features.extractor {
+        ExtractorChoice::Model { file, .. } => file.sha256.as_str(),
+        ExtractorChoice::Sift => "",
+    };
+    let matcher = match &features.matcher {
+        MatcherChoice::Model { file, .. } => file.sha256.as_str(),
+        MatcherChoice::MutualNearest | MatcherChoice::DualSoftmax => "",
+    };
+    serde_json::json!({
+        "extractor": features.extractor.name(),
+        "extractor_sha256": extractor,
+        "matcher": features.matcher.name(),
+        "matcher_sha256": matcher,
+        "settings": format!("{:?} {:?}", features.extractor_config, features.matcher_config),
+    })
 }
 
 /// Whether the tables stand on a row.

@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use homing_perception::AnyEstimator;
 use homing_sim::Score;
 use homing_sim::arena::Arena;
 use thiserror::Error;
@@ -13,9 +12,9 @@ use super::plan::{Plan, Task};
 use super::rows::Row;
 use super::store::{Store, StoreError};
 use crate::clip::{Clip, ClipError, ClipFolder};
-use crate::episode::run_episode;
 use crate::record::{CellKey, EpisodeRecord};
-use crate::{RunError, Trial, Watch};
+use crate::suite::course::{Course, LayCourse, Onlooker};
+use crate::{RunError, Watch};
 
 /// How to run.
 #[derive(Clone, Debug)]
@@ -56,7 +55,7 @@ pub enum SuiteError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
-/// Runs a plan. `progress` hears of every episode once it is kept; it says whether to go on.
+/// Runs a plan. `lay` says where episodes take place: in this process, or through others. `progress` hears of every episode once it is kept; it says whether to go on.
 ///
 /// # Errors
 /// [`SuiteError`] of the first thing that went wrong; other threads end their episode first.
@@ -65,6 +64,7 @@ pub fn run(
     rows: &[Row],
     store: &Store,
     options: &RunOptions,
+    lay: LayCourse<'_>,
     progress: &(dyn Fn(&EpisodeRecord) -> GoOn + Sync),
 ) -> Result<(), SuiteError> {
     let n_threads = match options.threads {
@@ -75,7 +75,7 @@ pub fn run(
     let failed: Mutex<Option<SuiteError>> = Mutex::new(None);
     let worker = || {
         while let Some(group) = plan.groups.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let ended = run_group(group, &rows[group[0].row], store, options, progress);
+            let ended = run_group(group, &rows[group[0].row], store, options, lay, progress);
             if !matches!(ended, Ok(GoOn::Yes)) {
                 next.store(usize::MAX / 2, Ordering::Relaxed);
             }
@@ -107,6 +107,7 @@ fn run_group(
     row: &Row,
     store: &Store,
     options: &RunOptions,
+    lay: LayCourse<'_>,
     progress: &(dyn Fn(&EpisodeRecord) -> GoOn + Sync),
 ) -> Result<GoOn, SuiteError> {
     // A pool of its own keeps the renderer's work on this thread: whole episodes side by side use the cores better.
@@ -117,13 +118,12 @@ fn run_group(
         move |source: RunError| SuiteError::Episode { row: row.name.to_owned(), set, scene, id, source }
     };
     let first = &group[0];
-    let opened = AnyEstimator::open(row.perception, &row.features).map_err(RunError::from);
-    let mut estimator = opened.map_err(failed(first))?;
+    let mut course = lay(row).map_err(failed(first))?;
     let loaded = pool.install(|| Arena::load(&first.episode.scene, first.episode.body)).map_err(RunError::from);
     let arena = Arc::new(loaded.map_err(failed(first))?);
     for task in group {
         let (record, clip) =
-            pool.install(|| run_task(task, row, &arena, &mut estimator, options)).map_err(failed(task))?;
+            pool.install(|| run_task(task, row, &arena, course.as_mut(), options)).map_err(failed(task))?;
         if let (Some(folder), Some(clip), Some(cause)) = (&options.clips, clip, record.cause) {
             clip.write(folder, &record, cause)?;
         }
@@ -139,24 +139,15 @@ fn run_task(
     task: &Task,
     row: &Row,
     arena: &Arc<Arena>,
-    estimator: &mut AnyEstimator,
+    course: &mut dyn Course,
     options: &RunOptions,
 ) -> Result<(EpisodeRecord, Option<Clip>), RunError> {
     let start = Instant::now();
     let episode = task.episode.episode(arena)?;
-    let mut trial: Trial = row.trial.clone();
-    trial.planner.body.radius_m = arena.size().radius_m;
-    let mut watch = Watch::default();
-    let mut clip = match options.clips {
-        Some(_) => Some(Clip::begin(arena, &episode)?),
-        None => None,
-    };
-    let run = run_episode(arena, &episode, estimator, &trial, &mut |record| {
-        watch.see(arena, &episode, record);
-        if let Some(clip) = &mut clip {
-            clip.see(record);
-        }
-    })?;
+    let clip = options.clips.as_ref().map(|_| Clip::begin(arena, &episode)).transpose()?;
+    let mut onlooker = Onlooker { arena: Arc::clone(arena), episode, watch: Watch::default(), clip };
+    let run = course.run(arena, &onlooker.episode.clone(), &mut onlooker)?;
+    let Onlooker { episode, watch, clip, .. } = onlooker;
     let strict = Score::strict(&run.finish);
     let record = EpisodeRecord {
         cell: CellKey { row: row.name.to_owned(), set: task.set.clone() },
