@@ -4,6 +4,7 @@
 //! [`bench::bench`] runs one episode in each of many generated flats, scores it strictly and says why it failed if it did.
 //! [`recall::recall`] asks for goals that were seen long ago.
 //! [`perception`] measures the eyes alone, on pairs of images.
+//! [`tables`] sets the records of many episodes beside the published tables.
 
 pub mod bench;
 pub mod cause;
@@ -15,6 +16,7 @@ pub mod recall;
 pub mod record;
 pub mod report;
 pub mod suite;
+pub mod tables;
 pub mod trial;
 pub mod visual_target;
 

@@ -113,11 +113,17 @@ impl BenchReport {
 /// Interval that holds the true rate in 95 % of cases (Wilson 1927, equation 4 with z = 1.96).
 #[must_use]
 pub fn wilson_95(n_success: usize, n: usize) -> (f64, f64) {
+    wilson_95_of(n_success as f64 / n.max(1) as f64, n)
+}
+
+/// The same of a rate, 0 to 1, observed on `n`. For the mean of any values from 0 to 1 it is too wide rather than too
+/// narrow: none of that mean spread wider than zeros and ones do.
+pub(crate) fn wilson_95_of(rate: f64, n: usize) -> (f64, f64) {
     if n == 0 {
         return (0.0, 1.0);
     }
     const Z: f64 = 1.959_963_984_540_054;
-    let (n, rate) = (n as f64, n_success as f64 / n as f64);
+    let n = n as f64;
     let centre = (rate + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
     let half = Z / (1.0 + Z * Z / n) * (rate * (1.0 - rate) / n + Z * Z / (4.0 * n * n)).sqrt();
     ((centre - half).max(0.0), (centre + half).min(1.0))

@@ -8,7 +8,7 @@ mod accuracy;
 mod findings;
 mod measure;
 mod pairs;
-mod plots;
+pub(crate) mod plots;
 mod report;
 mod sensor;
 mod simulated;

@@ -2,7 +2,7 @@
 
 mod bars;
 mod curves;
-mod style;
+pub(crate) mod style;
 
 use super::accuracy::{Accuracy, Class, TOLERANCES, angular_error_deg};
 use super::findings::Finding;

@@ -11,7 +11,7 @@ pub struct PlotError {
 }
 
 impl PlotError {
-    pub(super) fn new(cause: impl core::fmt::Display) -> Self {
+    pub(crate) fn new(cause: impl core::fmt::Display) -> Self {
         Self { reason: cause.to_string() }
     }
 }
@@ -20,10 +20,11 @@ impl PlotError {
 pub(super) const SIZE: (u32, u32) = (960, 540);
 /// Room for title and subtitle above the axes, pixels.
 pub(super) const HEAD_PX: u32 = 84;
-const INK: RGBColor = RGBColor(40, 44, 52);
+/// Letters and lines.
+pub(crate) const INK: RGBColor = RGBColor(40, 44, 52);
 const PALE: RGBColor = RGBColor(110, 116, 126);
 /// Lines of the grid.
-pub(super) const GRID: RGBColor = RGBColor(225, 228, 232);
+pub(crate) const GRID: RGBColor = RGBColor(225, 228, 232);
 /// Told apart by those who do not see all colours, too (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
@@ -35,19 +36,19 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(90, 90, 90),
 ];
 /// Any system has one of these.
-pub(super) const LETTERS: &str = "Helvetica, Arial, DejaVu Sans, sans-serif";
+pub(crate) const LETTERS: &str = "Helvetica, Arial, DejaVu Sans, sans-serif";
 
 /// The colour of the nth configuration.
-pub(super) fn colour(i: usize) -> RGBColor {
+pub(crate) fn colour(i: usize) -> RGBColor {
     COLOURS[i % COLOURS.len()]
 }
 
 /// Dark letters.
-pub(super) fn ink(size_px: u32) -> TextStyle<'static> {
+pub(crate) fn ink(size_px: u32) -> TextStyle<'static> {
     (LETTERS, size_px).into_font().color(&INK)
 }
 
 /// Letters that stand back.
-pub(super) fn pale(size_px: u32) -> TextStyle<'static> {
+pub(crate) fn pale(size_px: u32) -> TextStyle<'static> {
     (LETTERS, size_px).into_font().color(&PALE)
 }
