@@ -86,7 +86,24 @@ pub fn run_episode(
     discovery: Box<dyn GoalDiscovery>,
     observer: &mut dyn FnMut(&StepRecord<'_>),
 ) -> Result<EpisodeRun, RunError> {
-    let mut lockstep = Lockstep::new(arena, episode, estimator, planner, discovery)?;
+    run_episode_as(SimConfig::default(), arena, episode, estimator, planner, discovery, observer)
+}
+
+/// As [`run_episode`], with a robot that is not the benchmark's: a noisy one, or one that slides along walls.
+///
+/// # Errors
+/// [`RunError`] when a part cannot be set up or fails.
+pub fn run_episode_as(
+    robot: SimConfig,
+    arena: &Arc<Arena>,
+    episode: &Episode,
+    estimator: &mut AnyEstimator,
+    planner: PlannerConfig,
+    discovery: Box<dyn GoalDiscovery>,
+    observer: &mut dyn FnMut(&StepRecord<'_>),
+) -> Result<EpisodeRun, RunError> {
+    let robot = Simulator::new(Arc::clone(arena), robot)?;
+    let mut lockstep = Lockstep::new(robot, arena, episode, estimator, planner, discovery)?;
     while !lockstep.step(observer)? {}
     Ok(lockstep.finish(episode))
 }
@@ -106,13 +123,13 @@ struct Lockstep<'a> {
 
 impl<'a> Lockstep<'a> {
     fn new(
+        mut robot: Simulator,
         arena: &Arc<Arena>,
         episode: &Episode,
         estimator: &'a mut AnyEstimator,
         config: PlannerConfig,
         discovery: Box<dyn GoalDiscovery>,
     ) -> Result<Self, RunError> {
-        let mut robot = Simulator::new(Arc::clone(arena), SimConfig::default())?;
         robot.reset(episode)?;
         let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
         estimator.set_goal(GoalPhoto { id: GOAL_ID, rgb, intrinsics: episode.camera.intrinsics()? })?;
