@@ -1,6 +1,7 @@
 //! A disc that drives and turns: what becomes of a motion when things are in the way.
 
 use homing_core::{PlanarPose, wrap_angle};
+use serde::{Deserialize, Serialize};
 
 use crate::nav_grid::{CELL_M, NavGrid};
 
@@ -10,7 +11,8 @@ const SWEEP_M: f64 = 0.5 * CELL_M;
 pub const TICK_S: f64 = 0.01;
 
 /// What happens when the robot touches something.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Sliding {
     /// It stops there, as a real one does.
     #[default]
@@ -44,6 +46,14 @@ impl Body {
     pub fn advance(&mut self, grid: &NavGrid, distance_m: f64) -> Travel {
         let (cos, sin) = (libm::cos(self.pose.yaw_rad), libm::sin(self.pose.yaw_rad));
         self.shift(grid, distance_m * cos, distance_m * sin)
+    }
+
+    /// Goes straight to a pose given in its own frame, then turns to its heading: a motion with slip.
+    pub fn displace(&mut self, grid: &NavGrid, by: &PlanarPose) -> Travel {
+        let (cos, sin) = (libm::cos(self.pose.yaw_rad), libm::sin(self.pose.yaw_rad));
+        let travel = self.shift(grid, by.x_m * cos - by.y_m * sin, by.x_m * sin + by.y_m * cos);
+        self.turn(by.yaw_rad);
+        travel
     }
 
     /// Turns in place, radians, left positive. A disc always can.

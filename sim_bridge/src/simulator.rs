@@ -13,6 +13,7 @@ use crate::body::{Body, Sliding, Travel};
 use crate::constants::{FORWARD_M, TURN_RAD};
 use crate::episode::{Episode, FloorPose, Viewpoint, t_world_base};
 use crate::laser::LaserConfig;
+use crate::noise::{Command, Distortion, Noise, NoiseConfig};
 use crate::scene::World;
 use crate::score::{Ending, Finish, Score};
 
@@ -34,6 +35,8 @@ pub struct SimConfig {
     pub sliding: Sliding,
     /// Its scanner, if it has one.
     pub laser: Option<LaserConfig>,
+    /// What is noisy. The scanner is not.
+    pub noise: NoiseConfig,
 }
 
 impl Default for SimConfig {
@@ -46,11 +49,12 @@ impl Default for SimConfig {
             velocity_s: 0.1,
             sliding: Sliding::Off,
             laser: Some(LaserConfig::default()),
+            noise: NoiseConfig::default(),
         }
     }
 }
 
-/// A robot in an arena. Its odometry is exact; time is simulated and advances with motions only.
+/// A robot in an arena. Its odometry is exact unless it is made noisy; time is simulated and advances with motions only.
 #[derive(Debug)]
 pub struct Simulator {
     arena: Arc<Arena>,
@@ -61,6 +65,9 @@ pub struct Simulator {
     body: Body,
     now: Stamp,
     speed: (f64, f64),
+    noise: Noise,
+    /// Rate of the motion that just ended, radians a second: what a shutter sees of it.
+    turn_rad_s: f64,
     path_m: f64,
     steps: u64,
     collisions: u64,
@@ -100,6 +107,8 @@ impl Simulator {
             body,
             now: Stamp(0),
             speed: (0.0, 0.0),
+            noise: Noise::new(config.noise),
+            turn_rad_s: 0.0,
             path_m: 0.0,
             steps: 0,
             collisions: 0,
@@ -125,9 +134,19 @@ impl Simulator {
         }
         let (v_max, w_max) = (self.config.linear_m_s_max, self.config.angular_rad_s_max);
         let speed = (linear_m_s.clamp(-v_max, v_max), angular_rad_s.clamp(-w_max, w_max));
-        let outcome = self.moving(duration.as_secs_f64(), |body, arena| {
-            body.drive(arena.grid(), speed.0, speed.1, duration.as_secs_f64())
-        });
+        let duration_s = duration.as_secs_f64();
+        let command = Command::Velocity { distance_m: speed.0 * duration_s, angle_rad: speed.1 * duration_s };
+        let outcome = match self.noise.motion.actuate(command) {
+            None => {
+                self.moving(command, duration_s, |body, arena| body.drive(arena.grid(), speed.0, speed.1, duration_s))
+            }
+            Some(by) => self.moving(command, duration_s, |body, arena| {
+                let travel = body.drive(arena.grid(), by.x_m / duration_s, by.yaw_rad / duration_s, duration_s);
+                // Wheels do not drive aside: what slips is no way made, and no collision.
+                body.displace(arena.grid(), &PlanarPose { x_m: 0.0, y_m: by.y_m, yaw_rad: 0.0 });
+                travel
+            }),
+        };
         self.speed = if outcome.blocked { (0.0, speed.1) } else { speed };
         Ok(outcome)
     }
@@ -141,6 +160,12 @@ impl Simulator {
             linear_m_s: self.speed.0,
             angular_rad_s: self.speed.1,
         }
+    }
+
+    /// Gives noisy depth the distortion of a real camera.
+    pub fn set_depth_distortion(&mut self, distortion: Arc<Distortion>) {
+        self.noise.set_distortion(distortion);
+        self.seen = None;
     }
 
     /// The simulated time.
@@ -187,7 +212,7 @@ impl Simulator {
 
     /// Puts the robot somewhere else, as only an oracle can; `way_m` counts as driven. World frame.
     pub fn teleport(&mut self, pose: PlanarPose, way_m: f64) {
-        self.moving(self.config.velocity_s, |body, _| {
+        self.moving(Command::Stand, self.config.velocity_s, |body, _| {
             body.pose = pose;
             Travel { path_m: way_m, blocked: false }
         });
@@ -212,27 +237,45 @@ impl Simulator {
         Score::strict(&Finish::new(&self.arena, episode, &self.ending_truth(0)))
     }
 
-    fn t_odom_base(&self) -> Transform<Odom, Base> {
+    /// Where the robot really is in the odometry frame, metres and radians. Ground truth.
+    #[must_use]
+    pub fn t_odom_base_truth(&self) -> Transform<Odom, Base> {
         self.t_world_odom.inverse() * t_world_base(&self.arena, self.body.pose)
     }
 
-    /// Lets the body move, and time with it.
-    fn moving(&mut self, duration_s: f64, motion: impl FnOnce(&mut Body, &Arena) -> Travel) -> MotionOutcome {
-        let before = self.t_odom_base();
+    /// Where the odometry believes the robot to be.
+    fn t_odom_base(&self) -> Transform<Odom, Base> {
+        self.noise.motion.believed().map_or_else(|| self.t_odom_base_truth(), PlanarPose::to_transform)
+    }
+
+    /// Lets the body move, its odometry notice, and time pass.
+    fn moving(
+        &mut self,
+        command: Command,
+        duration_s: f64,
+        motion: impl FnOnce(&mut Body, &Arena) -> Travel,
+    ) -> MotionOutcome {
+        let (before, before_truth) = (self.t_odom_base(), self.t_odom_base_truth());
         let travel = motion(&mut self.body, &self.arena);
         self.path_m += travel.path_m;
         self.collisions += u64::from(travel.blocked);
         self.now = self.now.after(Duration::from_nanos((duration_s.max(0.0) * 1e9).round() as u64));
         self.seen = None;
+        let made = (before_truth.inverse() * self.t_odom_base_truth()).planar();
+        self.turn_rad_s = if duration_s > 0.0 { made.yaw_rad / duration_s } else { 0.0 };
+        self.noise.motion.sense(command, &before_truth.planar(), &made);
         let moved = (before.inverse() * self.t_odom_base()).planar();
         MotionOutcome { stamp: self.now, moved, blocked: travel.blocked }
     }
 
     fn look(&self) -> Result<Observation, BridgeError> {
         let t_world_camera = t_world_base(&self.arena, self.body.pose) * self.capabilities.t_base_camera;
-        let (rgb, depth) = self.arena.view(&self.intrinsics, &t_world_camera);
+        let device = |what: String| BridgeError::Device { name: self.capabilities.name.clone(), what };
+        let clean = self.arena.view(&self.intrinsics, &t_world_camera);
+        let noisy = self.noise.images(clean, &self.intrinsics, self.turn_rad_s, self.now);
+        let (rgb, depth) = noisy.map_err(|e| device(e.to_string()))?;
         let frame = RgbdFrame::new(self.now, Arc::new(rgb), Arc::new(depth), self.intrinsics)
-            .map_err(|e| BridgeError::Device { name: self.capabilities.name.clone(), what: e.to_string() })?;
+            .map_err(|e| device(e.to_string()))?;
         let scan = self.config.laser.map(|laser| self.arena.laser().scan(&self.body.pose, &laser, self.now));
         Ok(Observation { frame, odometry: self.odometry(), scan })
     }
@@ -264,19 +307,30 @@ impl RobotBridge for Simulator {
             }
             Motion::Forward { distance_m } => {
                 let distance_m = distance_m.clamp(-MOTION_S_MAX * v_max, MOTION_S_MAX * v_max);
-                self.moving(distance_m.abs() / v_max, |body, arena| body.advance(arena.grid(), distance_m))
+                let command = Command::Forward { distance_m };
+                let slipping = self.noise.motion.actuate(command);
+                self.moving(command, distance_m.abs() / v_max, |body, arena| match slipping {
+                    None => body.advance(arena.grid(), distance_m),
+                    Some(by) => body.displace(arena.grid(), &by),
+                })
             }
             Motion::Turn { angle_rad } => {
                 let angle_rad = angle_rad.clamp(-MOTION_S_MAX * w_max, MOTION_S_MAX * w_max);
-                self.moving(angle_rad.abs() / w_max, |body, _| {
-                    body.turn(angle_rad);
+                let command = Command::Turn { angle_rad };
+                let slipping = self.noise.motion.actuate(command);
+                self.moving(command, angle_rad.abs() / w_max, |body, arena| {
+                    match slipping {
+                        None => body.turn(angle_rad),
+                        // A slip in place is no way made, and where it ends at something no collision.
+                        Some(by) => _ = body.displace(arena.grid(), &by),
+                    }
                     Travel { path_m: 0.0, blocked: false }
                 })
             }
             Motion::Stop { done } => {
                 self.stopped = self.stopped || done;
                 // Standing takes time too: the next observation has a stamp of its own.
-                self.moving(self.config.velocity_s, |_, _| Travel { path_m: 0.0, blocked: false })
+                self.moving(Command::Stand, self.config.velocity_s, |_, _| Travel { path_m: 0.0, blocked: false })
             }
         };
         self.speed = (0.0, 0.0);
@@ -286,6 +340,7 @@ impl RobotBridge for Simulator {
     fn stop(&mut self) {
         if self.speed != (0.0, 0.0) {
             self.speed = (0.0, 0.0);
+            self.turn_rad_s = 0.0;
             self.seen = None;
         }
     }
@@ -307,6 +362,8 @@ impl Resettable for Simulator {
         self.t_world_odom = Transform::new(*t_world_base(&self.arena, self.body.pose).isometry());
         self.now = Stamp(0);
         self.speed = (0.0, 0.0);
+        self.turn_rad_s = 0.0;
+        self.noise.reset(episode.seed);
         self.path_m = 0.0;
         self.steps = 0;
         self.collisions = 0;

@@ -14,7 +14,7 @@ use homing_protocol::navigate::Outcome;
 use homing_protocol::session::DEFAULT_ENDPOINT;
 use homing_sim::episode::{self, GoalPlace};
 use homing_sim::geodesic::GeodesicField;
-use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, SceneRef};
+use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, NoisePreset, SceneRef};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::fleet::Fleet;
@@ -52,6 +52,10 @@ pub struct DemoArgs {
     policy: Policy,
     #[command(flatten)]
     features: FeatureArgs,
+    /// Noise of the simulated robot: off, pose (odometry that drifts), pose-depth, all (wheels and colour too); published,
+    /// published-depth (what the papers call so).
+    #[arg(long, default_value_t, value_name = "NAME")]
+    noise: NoisePreset,
     /// By the wall clock instead of in lockstep.
     #[arg(long)]
     realtime: bool,
@@ -217,7 +221,8 @@ fn start(args: &DemoArgs, task: &Task, folder: &RunFolder, viewer: Option<PathBu
         Some(_) => None,
         None => Some(folder.write_json("truth.json", &task.truth()?)?),
     };
-    let sim = folder.write_toml("sim.toml", &SimFile { pace, episode, session: Network::listen(&args.endpoint) })?;
+    let (noise, session) = (args.noise.name(), Network::listen(&args.endpoint));
+    let sim = folder.write_toml("sim.toml", &SimFile { pace, noise, episode, session })?;
     let perception = folder.write_toml("perception.toml", &PerceptionFile::new(&args.features, network()))?;
     let planner = PlannerFile { policy: args.policy.name(), session: network(), pace: PlannerPace { answer_ms_max } };
     let planner = folder.write_toml("planner.toml", &planner)?;

@@ -29,6 +29,7 @@ impl Network {
 #[derive(Serialize)]
 pub struct SimFile {
     pub pace: &'static str,
+    pub noise: &'static str,
     pub episode: PathBuf,
     pub session: Network,
 }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use homing_protocol::process::SessionSettings;
-use homing_sim::{SceneRef, Viewpoint};
+use homing_sim::body::Sliding;
+use homing_sim::{NoiseConfig, NoisePreset, SceneRef, SimConfig, Viewpoint};
 use serde::Deserialize;
 
 /// `sim.toml`.
@@ -20,6 +21,14 @@ pub struct Config {
     pub seed: u64,
     /// A glTF scene instead of a generated flat.
     pub glb: Option<PathBuf>,
+    /// What is noisy, by name.
+    pub noise: NoisePreset,
+    /// Combined with the episode's seed: another trial of the same episode.
+    pub noise_seed: u64,
+    /// A table of 80 x 80 x 5 factors (.npy) by which noisy depth is distorted, as Redwood's.
+    pub depth_distortion: Option<PathBuf>,
+    /// What happens at an obstacle.
+    pub sliding: Sliding,
     /// Frames per second in real time.
     pub frame_rate_hz: f64,
 }
@@ -43,6 +52,10 @@ impl Default for Config {
             episode: None,
             seed: 0,
             glb: None,
+            noise: NoisePreset::default(),
+            noise_seed: 0,
+            depth_distortion: None,
+            sliding: Sliding::default(),
             frame_rate_hz: 10.0,
         }
     }
@@ -55,6 +68,12 @@ impl Config {
             Some(path) => SceneRef::Glb { path: path.clone() },
             None => SceneRef::Flat { seed: self.seed },
         }
+    }
+
+    /// The robot.
+    pub fn robot(&self) -> SimConfig {
+        let noise = NoiseConfig { seed: self.noise_seed, ..self.noise.config() };
+        SimConfig { sliding: self.sliding, noise, ..SimConfig::default() }
     }
 
     /// The camera that takes goal photos of drawn episodes.

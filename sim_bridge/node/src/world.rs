@@ -6,7 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use homing_core::{PlanarPose, Resettable, RobotBridge};
 use homing_privileged::GroundTruth;
-use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, SimConfig, Simulator, episode};
+use homing_sim::noise::Distortion;
+use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, Simulator, episode};
 
 use crate::config::Config;
 
@@ -30,7 +31,10 @@ impl World {
                 episode::draw(&arena, config.seed, &spec)?
             }
         };
-        let simulator = Simulator::new(arena, SimConfig::default()).context("the simulator's camera")?;
+        let mut simulator = Simulator::new(arena, config.robot()).context("the simulator's camera")?;
+        if let Some(path) = &config.depth_distortion {
+            simulator.set_depth_distortion(Arc::new(read_distortion(path)?));
+        }
         let mut world = Self { simulator, collisions: 0, done: false, start: PlanarPose::default() };
         world.reset(&episode)?;
         Ok(world)
@@ -67,6 +71,12 @@ impl World {
         let triangles: usize = self.simulator.arena().scene().meshes.iter().map(|m| m.triangles.len()).sum();
         tracing::info!(name = body.name, triangles, "the body is ready");
     }
+}
+
+fn read_distortion(path: &Path) -> anyhow::Result<Distortion> {
+    let of = || format!("the depth distortion {}", path.display());
+    let bytes = std::fs::read(path).with_context(of)?;
+    Distortion::from_npy(&bytes).with_context(of)
 }
 
 fn read_episode(path: &Path) -> anyhow::Result<Episode> {

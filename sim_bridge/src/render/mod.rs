@@ -16,7 +16,7 @@ mod occupancy;
 mod raster;
 mod setup;
 mod shade;
-mod srgb;
+pub(crate) mod srgb;
 
 use std::sync::Arc;
 
