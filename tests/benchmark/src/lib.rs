@@ -5,6 +5,7 @@
 //! [`recall::recall`] asks for goals that were seen long ago.
 //! [`perception`] measures the eyes alone, on pairs of images.
 
+pub mod ablations;
 pub mod bench;
 pub mod cause;
 pub mod episode;
@@ -15,6 +16,7 @@ pub mod record;
 pub mod report;
 pub mod visual_target;
 
+pub use ablations::{ABLATIONS, Ablation, ablation};
 pub use bench::{BenchOptions, Policy, bench};
 pub use cause::{Cause, Watch};
 pub use episode::{EpisodeRun, StepRecord, run_episode};
