@@ -94,6 +94,10 @@ fn sighting() -> impl Strategy<Value = Sighting> {
     ]
 }
 
+fn probability() -> impl Strategy<Value = Option<f32>> {
+    proptest::option::of(0.0..=1.0_f32)
+}
+
 fn estimate() -> impl Strategy<Value = GoalEstimate> {
     let pixel = || any::<f32>().prop_filter("finite", |v| v.is_finite());
     let point =
@@ -103,11 +107,12 @@ fn estimate() -> impl Strategy<Value = GoalEstimate> {
         matching,
         pose,
     });
-    (stamp(), any::<u64>(), sighting(), 0..=u32::MAX, vec(point, 0..20), times).prop_map(
-        |(stamp, goal_id, sighting, n_matches, matched_points, times)| GoalEstimate {
+    (stamp(), any::<u64>(), sighting(), probability(), 0..=u32::MAX, vec(point, 0..20), times).prop_map(
+        |(stamp, goal_id, sighting, switch_probability, n_matches, matched_points, times)| GoalEstimate {
             stamp,
             goal_id,
             sighting,
+            switch_probability,
             n_matches: n_matches as usize,
             matched_points,
             times,

@@ -17,6 +17,9 @@ pub struct GoalEstimate {
     pub goal_id: u64,
     /// The finding.
     pub sighting: Sighting,
+    /// Probability, 0 to 1, that this image was taken within a step's reach of the photo, by a switch learned for that (NRNS);
+    /// `None` where perception has none, or either image has no keypoints.
+    pub switch_probability: Option<f32>,
     /// Keypoint matches before geometric verification.
     pub n_matches: usize,
     /// Verified matches (at most a few hundred), for people to look at.

@@ -7,7 +7,7 @@ use clap::Args;
 use homing_perception::onnx::inventory::AnyContract;
 use homing_perception::onnx::registry::FOLDER;
 use homing_perception::onnx::{
-    Entry, ExtractorContract, Manifest, MatcherContract, ModelFile, ProviderChoice, Role, RunConfig,
+    Entry, ExtractorContract, Manifest, MatcherContract, ModelFile, ProviderChoice, Role, RunConfig, switch,
 };
 use homing_perception::{Runtime, RuntimeError, find_runtime};
 
@@ -84,7 +84,7 @@ fn ended(well: bool) -> Ended {
 }
 
 fn describe(entry: &Entry) {
-    let role = if entry.role == Role::Extractor { "extractor" } else { "matcher" };
+    let role = entry.role.name();
     println!("{} ({role}, contract {}): {}, {} bytes", entry.name, entry.contract, entry.file, entry.bytes);
     println!("  sha256 {}", entry.sha256);
     println!("  licence {}, trained at {}", entry.licence, entry.training.commit);
@@ -104,6 +104,7 @@ fn contract_of(entry: &Entry) -> anyhow::Result<AnyContract> {
     let found = match entry.role {
         Role::Extractor => ExtractorContract::named(&entry.contract).map(AnyContract::Extractor),
         Role::Matcher => MatcherContract::named(&entry.contract).map(AnyContract::Matcher),
+        Role::Switch => (entry.contract == switch::CONTRACT.name).then_some(AnyContract::Switch),
     };
     found.ok_or_else(|| anyhow!("model {}: contract {} is unknown", entry.name, entry.contract))
 }

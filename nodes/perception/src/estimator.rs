@@ -10,6 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::locate::{Found, Views, locate};
+use crate::onnx::LearnedSwitch;
 use crate::seen_frame::SeenFrame;
 use crate::synthesis::Thumbnail;
 use crate::{MutualNearest, PerceptionConfig, PerceptionError, Sift};
@@ -22,6 +23,7 @@ pub struct GoalEstimator<E = Sift, M = MutualNearest> {
     config: PerceptionConfig,
     extractor: E,
     matcher: M,
+    switch: Option<LearnedSwitch>,
     goal: Option<Goal>,
 }
 
@@ -52,7 +54,13 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
         if let Some(threads) = config.threads {
             opencv::core::set_num_threads(i32::from(threads)).map_err(PerceptionError::opencv("set its threads"))?;
         }
-        Ok(Self { config, extractor, matcher, goal: None })
+        Ok(Self { config, extractor, matcher, switch: None, goal: None })
+    }
+
+    /// The same with a learned switch, whose probability goes with every estimate.
+    #[must_use]
+    pub fn with_switch(self, switch: Option<LearnedSwitch>) -> Self {
+        Self { switch, ..self }
     }
 
     /// Takes a photo to look for, replacing the last. A photo without texture is accepted and never seen.
@@ -136,6 +144,10 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
         let query = &frame.features;
         let matches = timed(&mut times.matching, || self.matcher.match_features(query, &goal.features))
             .map_err(|source| stage(self.matcher.name(), source))?;
+        let switch_probability = match &mut self.switch {
+            Some(switch) => switch.probability(query, &goal.features).map_err(|source| stage("switch", source))?,
+            None => None,
+        };
         let views = Views { frame, goal: &goal.features, goal_camera: &goal.photo.intrinsics, photo: &goal.thumbnail };
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed ^ frame.stamp.0);
         let Found { sighting, verified } = timed(&mut times.pose, || locate(&views, &matches, &self.config, &mut rng))?;
@@ -147,6 +159,7 @@ impl<E: FeatureExtractor, M: Matcher> GoalEstimator<E, M> {
             stamp: frame.stamp,
             goal_id: goal.photo.id,
             sighting,
+            switch_probability,
             n_matches: matches.len(),
             matched_points: matched_points.collect(),
             times,
@@ -168,6 +181,7 @@ pub(crate) fn no_goal(stamp: Stamp) -> GoalEstimate {
         stamp,
         goal_id: 0,
         sighting: Sighting::NotSeen { reason: UnseenReason::NoGoal },
+        switch_probability: None,
         n_matches: 0,
         matched_points: Vec::new(),
         times: StageTimes::default(),

@@ -17,7 +17,7 @@ impl AnyEstimator {
     pub fn open(config: PerceptionConfig, choice: &FeatureChoice) -> Result<Self, PerceptionError> {
         config.check()?;
         let Parts { extractor, matcher } = choice.open(&config)?;
-        Self::with_parts(config, extractor, matcher)
+        Ok(Self::with_parts(config, extractor, matcher)?.with_switch(choice.open_switch()?))
     }
 }
 
@@ -25,7 +25,7 @@ impl AnyEstimator {
 ///
 /// The models themselves give way first: a matcher to fewer keypoints, then both to the CPU. What fails after that fails for
 /// good: this one says DEGRADED in the log and goes on with SIFT and mutual nearest neighbours, the goal's features found
-/// anew.
+/// anew, and without a learned switch, which belongs to the model's features.
 pub struct ResilientEstimator {
     estimator: AnyEstimator,
     config: PerceptionConfig,
@@ -38,8 +38,7 @@ impl ResilientEstimator {
     /// # Errors
     /// As [`FeatureChoice::open`] and [`GoalEstimator::with_parts`]: at the start nothing is replaced by something else.
     pub fn open(config: PerceptionConfig, choice: &FeatureChoice) -> Result<Self, PerceptionError> {
-        config.check()?;
-        Self::with_parts(config, choice.open(&config)?)
+        Ok(Self { estimator: AnyEstimator::open(config, choice)?, config, degraded: None })
     }
 
     /// With parts opened before.

@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::arrival::ArrivalConfig;
 use crate::goal_filter::FilterConfig;
 use crate::mapper::MapperConfig;
-use crate::switches::SwitchConfig;
+use crate::switches::{SwitchConfig, SwitchKind};
 
 /// What to do about a depth image without a single usable depth.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -144,6 +144,10 @@ impl PlannerConfig {
             UnknownCells::Closed => 1.0,
             UnknownCells::Open { cost } => f64::from(cost),
         };
+        let probability_min = match self.switches.kind {
+            SwitchKind::Fused | SwitchKind::Sling => 0.5,
+            SwitchKind::Learned { probability_min } => f64::from(probability_min),
+        };
         let ranges = [
             ("map_side_m", self.map_side_m, 2.0, 100.0),
             ("resolution_m", self.resolution_m, 0.02, 0.25),
@@ -160,6 +164,7 @@ impl PlannerConfig {
             ("mapper.band_max_m", mapper.band_max_m, 0.05, 5.0),
             ("unknown_cells.cost", unknown_cost, 1.0, 100.0),
             ("switches.distance_max_m", self.switches.distance_max_m, 0.5, 20.0),
+            ("switches.kind.probability_min", probability_min, 0.0, 1.0),
             ("arrival.near_m", self.arrival.near_m, 0.1, 2.0),
             ("arrival.fine_rad", self.arrival.fine_rad, 0.001, 1.0),
             ("step_budget", self.step_budget as f64, 1.0, 1e9),

@@ -226,6 +226,12 @@ impl GoalFilter {
         Joined::Opened
     }
 
+    /// Believes this measurement, and forgets what was believed before: SLING predicts once, and drives.
+    pub fn replace(&mut self, measurement: &Measurement, step: u64) {
+        self.hypotheses.clear();
+        self.hypotheses.push(Hypothesis::new(measurement, step));
+    }
+
     /// Refines the best-fitting hypothesis by a direction seen from `t_odom_base`. Returns true if one agreed.
     pub fn refine_by_bearing(
         &mut self,

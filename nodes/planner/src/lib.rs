@@ -40,5 +40,5 @@ pub use local::{LocalChoice, LocalPlanner};
 pub use mapper::{Integrated, Mapper, MapperConfig};
 pub use planner::Planner;
 pub use route::{NoPath, Route, RoutePlanner};
-pub use switches::{SwitchConfig, Verdict};
+pub use switches::{Recovery, SwitchConfig, SwitchKind, Verdict};
 pub use terrain::{Room, Terrain, Window};

@@ -1,6 +1,7 @@
 //! The planner: one event in, one action out.
 
 mod drive;
+mod predict;
 mod sense;
 
 use homing_core::{
@@ -17,7 +18,7 @@ use crate::local::LocalPlanner;
 use crate::mapper::{Integrated, Mapper};
 use crate::progress::Progress;
 use crate::route::RoutePlanner;
-use crate::switches::Verdict;
+use crate::switches::{Look, Outlook, SwitchKind, Verdict};
 use crate::terrain::Terrain;
 
 /// Odometry readings remembered, some half an hour at 10 Hz: perception speaks of images as old as its memory.
@@ -67,6 +68,8 @@ pub struct Planner {
     hinted_at: Vec<u64>,
     arrival: Arrival,
     progress: Progress,
+    /// What the estimate of this step said, for the switches that fuse nothing.
+    look: Option<Look>,
     goal_id: Option<u64>,
     /// The goal of this mission or the last.
     last_goal_id: Option<u64>,
@@ -98,6 +101,7 @@ impl Planner {
             hinted_at: Vec::new(),
             arrival: Arrival::default(),
             progress: Progress::default(),
+            look: None,
             goal_id: None,
             last_goal_id: None,
             n_rejected: 0,
@@ -243,11 +247,12 @@ impl Planner {
 
     /// SLING's switches (3.4).
     fn switch(&mut self) {
-        let (step, pose) = (self.state.step, self.state.pose);
-        let (best, switches) = (self.filter.best(step), &self.config.switches);
+        let (step, pose, look) = (self.state.step, self.state.pose, self.look.take());
+        let (hypothesis, switches) = (self.filter.best(step), &self.config.switches);
+        let outlook = Outlook { hypothesis, look: look.as_ref(), pose: &pose, step };
         let verdict = match self.state.mode {
-            Mode::Explore => switches.enter(best, &pose, step),
-            _ => switches.stay(best, &pose, step),
+            Mode::Explore => switches.enter(&outlook),
+            _ => switches.stay(&outlook),
         };
         match verdict {
             Verdict::Exploit if self.state.mode == Mode::Explore => {
@@ -256,7 +261,13 @@ impl Planner {
                 self.state.mode = Mode::Exploit;
             }
             Verdict::Exploit => {}
-            Verdict::Explore(_) => self.state.mode = Mode::Explore,
+            Verdict::Explore(_) => {
+                if self.state.mode != Mode::Explore && switches.kind != SwitchKind::Fused {
+                    // Nothing is kept of a prediction that was given up.
+                    self.filter.reset();
+                }
+                self.state.mode = Mode::Explore;
+            }
         }
     }
 

@@ -62,14 +62,17 @@ fn sighting() -> impl Strategy<Value = Sighting> {
 }
 
 fn estimate() -> impl Strategy<Value = GoalEstimate> {
-    (0_u64..8_000_000_000, 0_u64..3, sighting()).prop_map(|(stamp, goal_id, sighting)| GoalEstimate {
-        stamp: Stamp(stamp),
-        goal_id,
-        sighting,
-        n_matches: 3,
-        matched_points: Vec::new(),
-        times: StageTimes::default(),
-    })
+    (0_u64..8_000_000_000, 0_u64..3, sighting(), prop::option::of(any::<f32>())).prop_map(
+        |(stamp, goal_id, sighting, switch_probability)| GoalEstimate {
+            stamp: Stamp(stamp),
+            goal_id,
+            sighting,
+            switch_probability,
+            n_matches: 3,
+            matched_points: Vec::new(),
+            times: StageTimes::default(),
+        },
+    )
 }
 
 fn event() -> impl Strategy<Value = StepEvent> {
@@ -245,6 +248,7 @@ fn a_goal_beside_is_driven_to_turned_to_and_stopped_at() {
                 n_inliers: 60,
                 rms_rad: 0.003,
             },
+            switch_probability: None,
             n_matches: 80,
             matched_points: Vec::new(),
             times: StageTimes::default(),
@@ -285,6 +289,7 @@ fn ahead_of_the_origin(stamp: u64) -> GoalEstimate {
             n_inliers: 60,
             rms_rad: 0.003,
         },
+        switch_probability: None,
         n_matches: 80,
         matched_points: Vec::new(),
         times: StageTimes::default(),

@@ -23,6 +23,7 @@ impl ToMessage<homing_msgs::GoalEstimate> for GoalEstimate {
             header: header(self.stamp, Camera::NAME),
             goal_id: self.goal_id,
             pose: pose_message(&Isometry3::identity()),
+            switch_probability: self.switch_probability.unwrap_or(f32::NAN),
             n_matches: count(self.n_matches),
             query_px: self.matched_points.iter().flat_map(|m| [m.query_px.0, m.query_px.1]).collect(),
             goal_px: self.matched_points.iter().flat_map(|m| [m.goal_px.0, m.goal_px.1]).collect(),
@@ -79,6 +80,7 @@ impl ToDomain<GoalEstimate> for homing_msgs::GoalEstimate {
             stamp: stamp(&self.header.stamp, NAME)?,
             goal_id: self.goal_id,
             sighting: sighting(self)?,
+            switch_probability: probability(self.switch_probability)?,
             n_matches: self.n_matches as usize,
             matched_points: pairs
                 .map(|(q, g)| MatchedPoint { query_px: (q[0], q[1]), goal_px: (g[0], g[1]) })
@@ -103,6 +105,15 @@ fn size(value: f64, field: &str) -> Result<f64, Malformed> {
         return Err(Malformed::new(NAME, format!("{field} is {value}: it cannot be negative")));
     }
     Ok(value)
+}
+
+/// A probability, NaN for none.
+fn probability(value: f32) -> Result<Option<f32>, Malformed> {
+    match value {
+        none if none.is_nan() => Ok(None),
+        some if (0.0..=1.0).contains(&some) => Ok(Some(some)),
+        other => Err(Malformed::new(NAME, format!("switch_probability is {other}: it must lie in 0 to 1"))),
+    }
 }
 
 fn sighting(message: &homing_msgs::GoalEstimate) -> Result<Sighting, Malformed> {

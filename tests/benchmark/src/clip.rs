@@ -1,7 +1,7 @@
 //! A short recording of how an episode was lost: its last steps, and those with the goal in view, for the viewer.
 
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,7 @@ use crate::RunError;
 use crate::cause::{Cause, is_in_view};
 use crate::episode::StepRecord;
 use crate::record::EpisodeRecord;
+use crate::tables::clip_path;
 
 /// Last steps kept.
 const LAST_STEPS: usize = 40;
@@ -47,19 +48,9 @@ pub enum ClipError {
     },
 }
 
-/// Where clips go: `FOLDER/ROW/SET/SCENE-ID.rrd`.
+/// The folder of a report, below which its clips go: see [`clip_path`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClipFolder(pub PathBuf);
-
-impl ClipFolder {
-    /// The clip of an episode, relative to the folder.
-    #[must_use]
-    pub fn name(record: &EpisodeRecord) -> PathBuf {
-        let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '.', "_");
-        let file = format!("{}-{}.rrd", plain(&record.scene), plain(&record.episode_id));
-        Path::new(&plain(&record.cell.row)).join(plain(&record.cell.set)).join(file)
-    }
-}
 
 #[derive(Debug)]
 struct Step {
@@ -126,7 +117,7 @@ impl Clip {
     /// # Errors
     /// [`ClipError`] when the file cannot be written whole.
     pub fn write(self, folder: &ClipFolder, record: &EpisodeRecord, cause: Cause) -> Result<PathBuf, ClipError> {
-        let path = folder.0.join(ClipFolder::name(record));
+        let path = folder.0.join(clip_path(record));
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(|source| ClipError::Folder { path: parent.to_owned(), source })?;
         }

@@ -6,6 +6,7 @@
 //! [`perception`] measures the eyes alone, on pairs of images.
 //! [`tables`] sets the records of many episodes beside the published tables.
 
+pub mod ablations;
 pub mod bench;
 pub mod cause;
 pub mod clip;
@@ -20,6 +21,7 @@ pub mod tables;
 pub mod trial;
 pub mod visual_target;
 
+pub use ablations::{ABLATIONS, Ablation, ablation};
 pub use bench::{BenchOptions, bench};
 pub use cause::{Cause, Moment, Watch};
 pub use episode::{EpisodeRun, StepRecord, run_episode};

@@ -19,6 +19,9 @@ use super::can_be_written;
 use crate::Ended;
 use crate::photo::{field_of_view, png};
 
+const SEED: u64 = 300_000;
+const HFOV_DEG: f64 = 120.0;
+
 /// Leads a robot from a view to another view of the same flat, without map or planner, and prints the table of the paper
 /// "Visual Target Navigation" with its own figures beside.
 ///
@@ -33,10 +36,10 @@ pub struct VisualTargetArgs {
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pairs: u16,
     /// Seed of the first flat; each pair has a flat of its own.
-    #[arg(long, default_value_t = 300_000)]
+    #[arg(long, default_value_t = SEED)]
     seed: u64,
     /// Horizontal field of view of the camera that takes both views, degrees; the paper does not state its own.
-    #[arg(long, default_value_t = 120.0, value_name = "DEG", value_parser = field_of_view)]
+    #[arg(long, default_value_t = HFOV_DEG, value_name = "DEG", value_parser = field_of_view)]
     hfov_deg: f64,
     /// Least share of either view that the other must see; the paper assumes "some overlapping region".
     #[arg(long, default_value_t = OVERLAP_MIN, value_name = "SHARE")]
@@ -86,6 +89,21 @@ pub fn run(args: VisualTargetArgs) -> anyhow::Result<Ended> {
     println!("{report}");
     write(&args, &options, &report)?;
     Ok(Ended::Well)
+}
+
+/// The paper's pairs, so many of each difficulty, for whoever wants them beside other tables: the report goes to `json`.
+pub fn measure(n_each: u16, models: &Path, threads: usize, json: &Path) -> anyhow::Result<()> {
+    let args = VisualTargetArgs {
+        pairs: n_each,
+        seed: SEED,
+        hfov_deg: HFOV_DEG,
+        overlap_min: OVERLAP_MIN,
+        models: models.to_owned(),
+        threads,
+        json: Some(json.to_owned()),
+        out: None,
+    };
+    run(args).map(drop)
 }
 
 /// One pair: what it is, and what came of it by pipeline: one step, multi-step, colour alone, planner.

@@ -123,6 +123,7 @@ impl Episode {
             stamp,
             goal_id: 1,
             sighting,
+            switch_probability: None,
             n_matches: n_inliers + 12 + (step % 9) as usize,
             matched_points,
             times: StageTimes {

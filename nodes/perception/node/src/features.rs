@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use homing_perception::PerceptionConfig;
 use homing_perception::onnx::{
     ChoiceError, ExtractorChoice, ExtractorConfig, FeatureChoice, MatcherChoice, MatcherConfig, ModelFile, ModelName,
-    ProviderChoice, RunConfig, registry,
+    ProviderChoice, RunConfig, SwitchChoice, registry,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
@@ -20,6 +20,9 @@ pub struct FeatureSettings {
     pub extractor: ModelSetting,
     /// Most keypoints per image; where none is named, 1024 of a model and 1500 of SIFT.
     pub keypoints_max: Option<usize>,
+    /// A model that says, beside them, whether an image was taken near the photo: "homing-switch", or { contract, path, sha256 };
+    /// none where none is named.
+    pub switch: Option<ModelSetting>,
     /// A larger image is shrunk to this longer side before a model sees it, pixels.
     pub side_max_px: u32,
 }
@@ -108,6 +111,7 @@ impl Default for FeatureSettings {
         Self {
             extractor: ModelSetting::Named("homing".to_owned()),
             keypoints_max: None,
+            switch: None,
             side_max_px: ExtractorConfig::default().side_max_px,
         }
     }
@@ -142,11 +146,16 @@ pub fn choice(
         Some(method) => MatcherChoice::resolve(&method.name(), &runtime.models)?,
         None => MatcherChoice::belonging_to(&extractor, &runtime.models)?,
     };
+    let switch = match &features.switch {
+        Some(switch) => SwitchChoice::resolve(&switch.name(), &runtime.models)?,
+        None => SwitchChoice::default(),
+    };
     let confidence_min = matcher.confidence_min.unwrap_or_else(|| method.confidence_min());
     let keypoints_max = features.keypoints_max.unwrap_or(ExtractorConfig::default().keypoints_max);
     Ok(FeatureChoice {
         extractor,
         matcher: method,
+        switch,
         extractor_config: ExtractorConfig { keypoints_max, side_max_px: features.side_max_px },
         matcher_config: MatcherConfig { keypoints_max, confidence_min },
         run: RunConfig { provider: provider.1, threads: runtime.threads },

@@ -7,12 +7,14 @@ use homing_core::{FeatureExtractor, Features, Matcher};
 
 use super::contract::Contract;
 use super::error::ChoiceError;
+use super::extractors::homing::DIMENSION;
 use super::extractors::{ExtractorConfig, ExtractorContract};
 use super::file::ModelFile;
-use super::inventory::test_image;
+use super::inventory::{test_features, test_image};
 use super::matchers::{MatcherConfig, MatcherContract};
 use super::registry::{Entry, MANIFEST, Manifest, Role};
 use super::session::{OrtNetwork, RunConfig};
+use super::switch::{self, LearnedSwitch, SwitchChoice};
 use super::{AnyExtractor, AnyMatcher, ModelError};
 use crate::provider::{Runtime, RuntimeError, find_runtime};
 use crate::{DualSoftmax, MutualNearest, PerceptionConfig, PerceptionError, Sift};
@@ -165,10 +167,10 @@ impl MatcherChoice {
     }
 }
 
-fn listed(name: &str, role: Role, built_in: &[&str], folder: &Path) -> Result<Entry, ChoiceError> {
+pub(super) fn listed(name: &str, role: Role, built_in: &[&str], folder: &Path) -> Result<Entry, ChoiceError> {
     let manifest = Manifest::read(folder)?;
     manifest.find(name, role).cloned().ok_or_else(|| {
-        let what = if role == Role::Extractor { "extractor" } else { "matcher" };
+        let what = role.name();
         if manifest.models.is_empty() {
             return ChoiceError::NoModels { role: what, name: name.to_owned(), manifest: folder.join(MANIFEST) };
         }
@@ -176,7 +178,7 @@ fn listed(name: &str, role: Role, built_in: &[&str], folder: &Path) -> Result<En
     })
 }
 
-fn unknown<'a>(role: &'static str, name: &str, known: impl IntoIterator<Item = &'a str>) -> ChoiceError {
+pub(super) fn unknown<'a>(role: &'static str, name: &str, known: impl IntoIterator<Item = &'a str>) -> ChoiceError {
     let known = known.into_iter().collect::<Vec<_>>().join(", ");
     ChoiceError::UnknownName { role, name: name.to_owned(), known }
 }
@@ -188,6 +190,8 @@ pub struct FeatureChoice {
     pub extractor: ExtractorChoice,
     /// What pairs them.
     pub matcher: MatcherChoice,
+    /// What says, beside them, whether an image was taken near the photo.
+    pub switch: SwitchChoice,
     /// Settings of an extractor that is a model.
     pub extractor_config: ExtractorConfig,
     /// Settings of a matcher that is a model; its smallest confidence is also that of `dual-softmax`.
@@ -241,6 +245,20 @@ impl FeatureChoice {
             self.prove(&mut extractor, &mut matcher)?;
         }
         Ok(Parts { extractor, matcher })
+    }
+
+    /// Opens the learned switch, if one is chosen, and proves it by one run.
+    ///
+    /// # Errors
+    /// [`PerceptionError::Choice`] for a switch that does not belong to the extractor, [`PerceptionError::Model`] for a model
+    /// that cannot be used.
+    pub fn open_switch(&self) -> Result<Option<LearnedSwitch>, PerceptionError> {
+        self.switch.check_family(&self.extractor)?;
+        let SwitchChoice::Model { file, .. } = &self.switch else { return Ok(None) };
+        let mut switch = LearnedSwitch::new(Box::new(self.network(file, &switch::CONTRACT)?));
+        let features = test_features(64, DIMENSION);
+        switch.probability(&features, &features)?;
+        Ok(Some(switch))
     }
 
     /// Whether ONNX Runtime is needed.

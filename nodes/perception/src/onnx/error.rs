@@ -133,10 +133,20 @@ pub enum ChoiceError {
         /// The extractor, and the length of its descriptors where that is known.
         extractor: String,
     },
-    /// The matcher was trained on another version of the extractor.
-    #[error("matcher {matcher}: expected the extractor it was trained on, sha256 {expected}, found {found}")]
+    /// The learned switch was made for other features.
+    #[error("switch {switch} expects {expected}, found {extractor}: choose that, or no switch")]
+    SwitchMismatch {
+        /// The switch's contract.
+        switch: &'static str,
+        /// What it was trained on.
+        expected: String,
+        /// The extractor.
+        extractor: String,
+    },
+    /// The matcher or switch was trained on another version of the extractor.
+    #[error("model {matcher}: expected the extractor it was trained on, sha256 {expected}, found {found}")]
     TrainedOn {
-        /// The matcher's file.
+        /// The file of the matcher or switch.
         matcher: String,
         /// Hash of the extractor it was trained on.
         expected: String,

@@ -6,11 +6,13 @@ use homing_core::{FeatureExtractor, Features, Keypoint, Matcher, RgbImage};
 
 use super::contract::Contract;
 use super::descriptors::normalise;
+use super::extractors::homing::DIMENSION;
 use super::extractors::{ExtractorConfig, ExtractorContract};
 use super::file::ModelFile;
 use super::matchers::{MatcherConfig, MatcherContract};
 use super::network::Network;
 use super::session::{OrtNetwork, Provider, RunConfig};
+use super::switch::{self, LearnedSwitch};
 use crate::PerceptionError;
 use crate::provider::Runtime;
 
@@ -31,20 +33,22 @@ pub struct Checked {
     pub result: String,
 }
 
-/// A contract that is either an extractor's or a matcher's.
+/// A contract of any kind.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum AnyContract {
     /// An extractor's.
     Extractor(ExtractorContract),
     /// A matcher's.
     Matcher(MatcherContract),
+    /// The learned switch's.
+    Switch,
 }
 
 impl AnyContract {
     /// All there are.
     pub fn all() -> impl Iterator<Item = Self> {
         let extractors = ExtractorContract::ALL.into_iter().map(Self::Extractor);
-        extractors.chain(MatcherContract::ALL.into_iter().map(Self::Matcher))
+        extractors.chain(MatcherContract::ALL.into_iter().map(Self::Matcher)).chain([Self::Switch])
     }
 
     /// As data.
@@ -53,6 +57,7 @@ impl AnyContract {
         match self {
             Self::Extractor(contract) => contract.contract(),
             Self::Matcher(contract) => contract.contract(),
+            Self::Switch => &switch::CONTRACT,
         }
     }
 
@@ -60,12 +65,14 @@ impl AnyContract {
     #[must_use]
     pub fn explain(self) -> String {
         let contract = self.contract();
+        let belonging = |takes: &[&str]| format!("\n  belongs with {}", takes.join(" or "));
         let (role, belongs) = match self {
             Self::Extractor(_) => ("extractor", String::new()),
             Self::Matcher(matcher) => {
                 let takes: Vec<&str> = matcher.takes().iter().map(|c| c.contract().name).collect();
-                ("matcher", format!("\n  belongs with {}", takes.join(" or ")))
+                ("matcher", belonging(&takes))
             }
+            Self::Switch => ("switch", belonging(&[ExtractorContract::Homing.contract().name])),
         };
         let mut text = format!("{} ({role}){belongs}", contract.name);
         for (kind, ports) in [("in", contract.inputs), ("out", contract.outputs)] {
@@ -96,6 +103,14 @@ impl AnyContract {
                 Box::new(move || {
                     let features = extractor.extract(&image)?;
                     Ok(format!("{} keypoints, {} long", features.keypoints.len(), features.dimension))
+                })
+            }
+            Self::Switch => {
+                let features = test_features(512, DIMENSION);
+                let mut switch = LearnedSwitch::new(Box::new(network));
+                Box::new(move || {
+                    let probability = switch.probability(&features, &features)?.unwrap_or_default();
+                    Ok(format!("keypoints beside themselves: probability {probability:.2}"))
                 })
             }
             Self::Matcher(contract) => {
@@ -140,7 +155,7 @@ pub fn test_image() -> RgbImage {
 }
 
 /// Features of an image of 640x480 that follow no image.
-fn test_features(n: usize, dimension: usize) -> Features {
+pub(super) fn test_features(n: usize, dimension: usize) -> Features {
     let random = |i: usize| {
         let mixed = (i as u32).wrapping_mul(0x9e37_79b9);
         ((mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32

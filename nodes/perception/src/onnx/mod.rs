@@ -19,6 +19,7 @@ pub mod matchers;
 pub mod network;
 pub mod registry;
 pub mod session;
+pub mod switch;
 
 use homing_core::{FeatureExtractor, Matcher};
 
@@ -36,3 +37,4 @@ pub use file::ModelFile;
 pub use matchers::{MatcherConfig, MatcherContract};
 pub use registry::{Entry, Manifest, Role};
 pub use session::{Provider, ProviderChoice, RunConfig};
+pub use switch::{LearnedSwitch, SwitchChoice};

@@ -8,6 +8,7 @@ use super::error::ChoiceError;
 use super::extractors::ExtractorContract;
 use super::file::ModelFile;
 use super::matchers::MatcherContract;
+use super::switch;
 
 /// Name of the file in the folder of models.
 pub const MANIFEST: &str = "manifest.json";
@@ -26,6 +27,20 @@ pub enum Role {
     Extractor,
     /// Pairs keypoints.
     Matcher,
+    /// Tells whether two images were taken near each other.
+    Switch,
+}
+
+impl Role {
+    /// For reports, and the end of a model's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Extractor => "extractor",
+            Self::Matcher => "matcher",
+            Self::Switch => "switch",
+        }
+    }
 }
 
 /// One model. Training writes more about it than is read here.
@@ -52,7 +67,7 @@ pub struct Entry {
     /// What was measured when it was made; for people.
     #[serde(default)]
     pub accuracy: serde_json::Value,
-    /// Of a matcher: the sha256 of the extractor whose descriptors it was trained on.
+    /// Of a matcher or a switch: the sha256 of the extractor whose descriptors it was trained on.
     #[serde(default)]
     pub extractor_sha256: Option<String>,
     /// Of a matcher: the smallest confidence of a match, 0 to 1, that served best on validation.
@@ -94,6 +109,7 @@ impl Manifest {
             let known = match entry.role {
                 Role::Extractor => ExtractorContract::named(&entry.contract).is_some(),
                 Role::Matcher => MatcherContract::named(&entry.contract).is_some(),
+                Role::Switch => entry.contract == switch::CONTRACT.name,
             };
             if !known {
                 return Err(format!("model {}: contract \"{}\" is unknown", entry.name, entry.contract));
@@ -131,9 +147,8 @@ impl Manifest {
     /// The model of that name and role.
     #[must_use]
     pub fn find(&self, name: &str, role: Role) -> Option<&Entry> {
-        let suffix = if role == Role::Extractor { "extractor" } else { "matcher" };
         let mut of_role = self.models.iter().filter(|entry| entry.role == role);
-        of_role.find(|entry| entry.name == name || entry.name == format!("{name}-{suffix}"))
+        of_role.find(|entry| entry.name == name || entry.name == format!("{name}-{}", role.name()))
     }
 
     /// The first matcher that was trained on the extractor of that hash.

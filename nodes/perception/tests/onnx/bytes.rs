@@ -133,6 +133,24 @@ pub fn homing_extractor(dimension: u64) -> Model {
         .output("reliability", Kind::Float, &[Is(1), Is(1), Named("h"), Named("w")])
 }
 
+/// A model of contract `homing-switch`: by `operator`, of the largest cosine between two keypoints.
+pub fn homing_switch(operator: &str) -> Model {
+    let mut model = Model::new();
+    for (i, n) in [("0", Named("N0")), ("1", Named("N1"))] {
+        model = model
+            .input(&format!("keypoints{i}"), Kind::Float, &[n, Is(2)])
+            .input(&format!("descriptors{i}"), Kind::Float, &[n, Is(64)])
+            .input(&format!("scores{i}"), Kind::Float, &[n]);
+    }
+    model
+        .node("Transpose", &["descriptors1"], "turned", &[("perm", &[1, 0])])
+        .node("MatMul", &["descriptors0", "turned"], "similarity", &[])
+        .node("ReduceMax", &["similarity"], "best", &[("axes", &[1]), ("keepdims*", &[0])])
+        .node("ReduceMax", &["best"], "cosine", &[("axes", &[0]), ("keepdims*", &[1])])
+        .node(operator, &["cosine"], "probability", &[])
+        .output("probability", Kind::Float, &[Is(1)])
+}
+
 /// A model of contract `homing-matcher`: the most similar keypoint, its cosine as confidence. With or without a batch, and
 /// the names that go with it.
 pub fn homing_matcher(dimension: u64, batch: &[Side]) -> Model {

@@ -7,4 +7,5 @@ mod flight;
 mod real;
 mod refusals;
 mod support;
+mod switch;
 mod working;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use homing_core::GoalDiscovery;
-use homing_planner::{Frontier, PlannerConfig, RandomGoal, Straight};
+use homing_planner::{Frontier, PlannerConfig, RandomGoal, Recovery, Straight, SwitchKind};
 use homing_protocol::process::SessionSettings;
 use serde::Deserialize;
 
@@ -21,8 +21,63 @@ pub struct Config {
     pub body: BodySettings,
     /// Switches and budget.
     pub mission: MissionSettings,
+    /// Between exploring and driving to the goal.
+    pub switches: SwitchSettings,
     /// Waiting.
     pub pace: PaceSettings,
+}
+
+/// `[switches]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SwitchSettings {
+    /// What is looked at.
+    pub kind: KindName,
+    /// Whether there is a way back.
+    pub recovery: RecoveryName,
+}
+
+/// The switches' names in the file.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KindName {
+    /// Estimates fused over time.
+    #[default]
+    Fused,
+    /// One estimate, as SLING published it.
+    Sling,
+    /// A model of perception's.
+    Learned,
+}
+
+/// Names of the ways back.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RecoveryName {
+    /// There is one.
+    #[default]
+    On,
+    /// There is none.
+    Off,
+}
+
+impl From<KindName> for SwitchKind {
+    fn from(name: KindName) -> Self {
+        match name {
+            KindName::Fused => Self::Fused,
+            KindName::Sling => Self::Sling,
+            KindName::Learned => Self::LEARNED,
+        }
+    }
+}
+
+impl From<RecoveryName> for Recovery {
+    fn from(name: RecoveryName) -> Self {
+        match name {
+            RecoveryName::On => Self::On,
+            RecoveryName::Off => Self::Off,
+        }
+    }
 }
 
 /// Goal-discovery policies.
@@ -152,6 +207,8 @@ impl Config {
             observation_age_max: self.pace.time_to_live(),
             ..PlannerConfig::default()
         };
+        config.switches.kind = self.switches.kind.into();
+        config.switches.recovery = self.switches.recovery.into();
         config.body.radius_m = self.body.radius_m;
         config.body.forward_m = self.body.forward_m;
         // An untouched default keeps its bits: degrees would move the last one.

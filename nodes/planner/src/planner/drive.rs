@@ -67,6 +67,9 @@ impl Planner {
                 self.state.mode = Mode::Arrived;
                 Decision::new(Action::Stop, "arrived: position, heading and view agree")
             }
+            Approach::Wait | Approach::Refuted if !self.may_turn_back() => {
+                self.stop_here("at the goal: there is no way back to look elsewhere")
+            }
             Approach::Wait => Decision::hold("at the goal: waiting for perception to confirm"),
             Approach::Refuted if perception == Perception::Absent && goal.nearest_m < 1.0 => {
                 self.state.mode = Mode::Arrived;
@@ -83,6 +86,12 @@ impl Planner {
 
     /// The goal stays believed, but cannot be reached: search on, and try again later.
     fn give_up_for_now(&mut self, why: &str) -> Decision {
+        if !self.may_turn_back() {
+            if self.mapper.forget_bumps() > 0 {
+                return Decision::new(Action::TurnLeft, why);
+            }
+            return self.stop_here(why);
+        }
         let step = self.state.step;
         self.filter.park(step, step + self.config.switches.parked_steps);
         self.mapper.forget_bumps();

@@ -12,6 +12,7 @@ use crate::evidence::{View, weigh};
 use crate::goal_filter::{Doubt, Joined, Sightline, camera_azimuth};
 use crate::mapper::Integrated;
 use crate::progress::jumped;
+use crate::switches::SwitchKind;
 
 impl Planner {
     /// Remembers where the robot is; an impossible reading gives the reason to hold.
@@ -67,6 +68,9 @@ impl Planner {
     pub(super) fn fuse(&mut self, observation: &PlannerObservation, estimate: Option<&GoalEstimate>) {
         let Some(estimate) = estimate.filter(|e| Some(e.goal_id) == self.goal_id) else { return };
         let Some(t_odom_base) = self.odometry.at(estimate.stamp) else { return };
+        if self.config.switches.kind != SwitchKind::Fused {
+            return self.predict(observation, estimate, &t_odom_base);
+        }
         let (step, t_base_camera) = (self.state.step, &observation.t_base_camera);
         let pose = t_odom_base.planar();
         let before = self.filter.best(step).map(|h| h.n_fused);
@@ -107,7 +111,7 @@ impl Planner {
         }
         self.arrival.hear(estimate.stamp, agreed);
         let against = !agreed && !names_it && !matches!(estimate.sighting, Sighting::Bearing { .. });
-        if against && self.doubt(&pose) == Doubt::Refuted {
+        if against && self.may_turn_back() && self.doubt(&pose) == Doubt::Refuted {
             self.filter.condemn(step);
             self.arrival.reset();
             self.state.mode = Mode::Explore;
@@ -116,7 +120,7 @@ impl Planner {
 
     /// Fuses what was found in an image from before. It speaks for a place, and never against one: nobody looks there now.
     pub(super) fn recall(&mut self, observation: &PlannerObservation, estimate: &GoalEstimate) {
-        if Some(estimate.goal_id) != self.goal_id {
+        if Some(estimate.goal_id) != self.goal_id || self.config.switches.kind != SwitchKind::Fused {
             return;
         }
         let Some(t_odom_base) = self.odometry.at(estimate.stamp) else { return };
@@ -136,7 +140,7 @@ impl Planner {
         self.filter.doubt(pose, view, self.config.switches.n_inliers_min as f64, self.state.step)
     }
 
-    fn hint(&mut self, pose: &PlanarPose, bearing_rad: f64, n_inliers: usize) {
+    pub(super) fn hint(&mut self, pose: &PlanarPose, bearing_rad: f64, n_inliers: usize) {
         let oldest = self.hinted_at.first().copied();
         if self.hints.len() == HINTS_MAX || oldest.is_some_and(|at| at + HINT_STEPS < self.state.step) {
             self.hints.remove(0);

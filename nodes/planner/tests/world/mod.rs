@@ -213,6 +213,7 @@ impl World {
             stamp: self.clock,
             goal_id: 7,
             sighting,
+            switch_probability: None,
             n_matches: 100,
             matched_points: Vec::new(),
             times: StageTimes::default(),

@@ -137,13 +137,16 @@ fn by_scene(row: usize, set: &str, episodes: Vec<EpisodeRef>) -> Vec<Vec<Task>> 
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
 mod tests {
+    use std::path::Path;
+
     use homing_perception::onnx::FeatureChoice;
 
     use super::*;
     use crate::suite::rows::rows;
 
     fn plan(amounts: Amounts) -> (Vec<Row>, Plan) {
-        let rows = rows(&FeatureChoice::default(), &FeatureChoice::default()).unwrap();
+        let models = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../nodes/perception/models"));
+        let rows = rows(&FeatureChoice::default(), models).unwrap();
         let plan = Plan::new(&rows, amounts, &[]);
         (rows, plan)
     }

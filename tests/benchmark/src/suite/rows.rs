@@ -1,9 +1,14 @@
 //! The rows of the tables: what is tried, by name.
 
-use homing_perception::PerceptionConfig;
-use homing_perception::onnx::{ExtractorChoice, FeatureChoice, MatcherChoice};
+use std::path::Path;
 
-use crate::{GoalPose, LastMile, Policy, RunError, Trial};
+use homing_perception::PerceptionConfig;
+use homing_perception::onnx::{ChoiceError, ExtractorChoice, FeatureChoice, MatcherChoice, RunConfig, SwitchChoice};
+use homing_sim::{NoisePreset, SimConfig};
+
+use crate::ablations::{ABLATIONS, ablation};
+use crate::tables::BASE;
+use crate::{GoalPose, LastMile, Policy, Trial};
 
 /// One row: a system under test.
 #[derive(Clone, Debug)]
@@ -49,11 +54,16 @@ fn described(features: &FeatureChoice) -> serde_json::Value {
         MatcherChoice::Model { file, .. } => file.sha256.as_str(),
         MatcherChoice::MutualNearest | MatcherChoice::DualSoftmax => "",
     };
+    let switch = match &features.switch {
+        SwitchChoice::Model { file, .. } => file.sha256.as_str(),
+        SwitchChoice::Geometry => "",
+    };
     serde_json::json!({
         "extractor": features.extractor.name(),
         "extractor_sha256": extractor,
         "matcher": features.matcher.name(),
         "matcher_sha256": matcher,
+        "switch_sha256": switch,
         "settings": format!("{:?} {:?}", features.extractor_config, features.matcher_config),
     })
 }
@@ -67,30 +77,46 @@ pub enum Headline {
     No,
 }
 
-/// Every row, headlines first. `own` are our features, `sift` the traditional ones.
+/// Every row, headlines first. `own` are our features; `models` is the folder of the models.
 ///
 /// # Errors
-/// None today: rows are fixed.
-pub fn rows(own: &FeatureChoice, sift: &FeatureChoice) -> Result<Vec<Row>, RunError> {
-    let perception = PerceptionConfig { threads: Some(1), ..PerceptionConfig::default() };
-    let row = |name, what, headline, trial| Row { name, what, features: own.clone(), perception, trial, headline };
+/// [`ChoiceError`] where a model is not listed in that folder.
+pub fn rows(own: &FeatureChoice, models: &Path) -> Result<Vec<Row>, ChoiceError> {
     let base = Trial::default();
+    let row = |name, what, trial| Row {
+        name,
+        what,
+        features: FeatureChoice { run: RunConfig { threads: 1, ..own.run }, ..own.clone() },
+        perception: PerceptionConfig { threads: Some(1), ..PerceptionConfig::default() },
+        trial,
+        headline: Headline::No,
+    };
     let with = |policy| Trial { policy, ..base.clone() };
-    let (yes, no) = (Headline::Yes, Headline::No);
-    let (oracle_pose, teleport) = (GoalPose::Oracle, LastMile::Teleported);
-    Ok(vec![
-        row("frontier", "ours: Frontier, own features, geometric switches", yes, base.clone()),
-        row("oracle-gd", "ours with Oracle-GD", yes, with(Policy::Oracle)),
-        row("straight", "ours with Straight-GD", no, with(Policy::Straight)),
-        row("random", "ours with random goals", no, with(Policy::RandomGoal)),
-        Row { features: sift.clone(), ..row("sift", "without neural features", no, base.clone()) },
-        row("oracle-lm-pose", "with Oracle-LM-Pose", no, Trial { goal_pose: oracle_pose, ..base.clone() }),
-        row("oracle-lp", "with Oracle-LP", no, Trial { last_mile: teleport, ..base.clone() }),
-        row(
-            "oracle-lm-pose-lp",
-            "with Oracle-LM-Pose and Oracle-LP",
-            no,
-            Trial { goal_pose: oracle_pose, last_mile: teleport, ..base.clone() },
-        ),
-    ])
+    let noisy = |noise: NoisePreset| Trial { sim: SimConfig { noise: noise.config(), ..base.sim }, ..base.clone() };
+    let last_mile =
+        |goal_pose, last_mile| Trial { goal_pose, last_mile, sim: base.sim, ..base.clone() };
+    let headline = |row| Row { headline: Headline::Yes, ..row };
+    let mut rows = vec![
+        headline(row("frontier", "ours: Frontier, own features, fused geometric switches", base.clone())),
+        headline(row("oracle-gd", "goal discovery by an oracle", with(Policy::Oracle))),
+        row("straight", "goal discovery straight ahead", with(Policy::Straight)),
+        row("random", "goal discovery by places drawn at random", with(Policy::RandomGoal)),
+        row("pose-noise", "odometry that drifts", noisy(NoisePreset::Pose)),
+        row("pose-depth-noise", "odometry that drifts, noisy depth", noisy(NoisePreset::PoseDepth)),
+        row("all-noise", "the same, wheels that slip, a camera that blurs", noisy(NoisePreset::All)),
+        row("oracle-lp", "the last mile by teleport", last_mile(GoalPose::Estimated, LastMile::Teleported)),
+        row("oracle-lm-pose", "the goal's pose by an oracle", last_mile(GoalPose::Oracle, LastMile::Driven)),
+        row("oracle-lm-pose-lp", "both", last_mile(GoalPose::Oracle, LastMile::Teleported)),
+    ];
+    for (name, what) in ABLATIONS.into_iter().filter(|(name, _)| *name != BASE) {
+        let Some(ablation) = ablation(name, models)? else { continue };
+        let mut row = row(name, what, Trial { planner: ablation.planner, ..base.clone() });
+        row.perception = PerceptionConfig { threads: Some(1), ..ablation.perception };
+        if name == "sift" {
+            row.features = ablation.features;
+        }
+        row.features.switch = ablation.features.switch;
+        rows.push(row);
+    }
+    Ok(rows)
 }

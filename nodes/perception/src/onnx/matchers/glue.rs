@@ -15,7 +15,7 @@ const KEYPOINTS_MIN: usize = 256;
 
 /// Whether the model also takes the keypoints' scores.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
-pub(super) enum Takes {
+pub(in crate::onnx) enum Takes {
     /// kpts0, kpts1, desc0, desc1.
     PositionsAndDescriptors,
     /// And scores0, scores1.
@@ -54,7 +54,7 @@ impl Matcher for GlueMatcher {
         if query.keypoints.is_empty() || goal.keypoints.is_empty() {
             return Ok(Vec::new());
         }
-        self.check(query, goal)?;
+        check(&*self.network, query, goal)?;
         loop {
             let sides = (Side::of(query, self.keypoints_max), Side::of(goal, self.keypoints_max));
             let (n_query, n_goal) = (sides.0.n, sides.1.n);
@@ -78,22 +78,6 @@ impl Matcher for GlueMatcher {
 impl GlueMatcher {
     pub fn new(network: Box<dyn Network>, form: Form, config: MatcherConfig) -> Self {
         Self { network, form, config, keypoints_max: config.keypoints_max }
-    }
-
-    fn check(&self, query: &Features, goal: &Features) -> Result<(), PerceptionError> {
-        for features in [query, goal] {
-            let (keypoints, found) = (features.keypoints.len(), features.descriptors.len());
-            let expected = keypoints * features.dimension;
-            if expected != found {
-                return Err(PerceptionError::Features { keypoints, expected, found });
-            }
-        }
-        let wanted = self.network.inputs().get(2).and_then(|port| port.shape.last().copied().flatten());
-        if query.dimension != goal.dimension || wanted.is_some_and(|n| n != query.dimension) {
-            let goal = if query.dimension == goal.dimension { wanted.unwrap_or_default() } else { goal.dimension };
-            return Err(PerceptionError::Dimension { query: query.dimension, goal });
-        }
-        Ok(())
     }
 
     /// After a fault: half of the keypoints, then all of them on the CPU, then half again, then the fault itself.
@@ -141,8 +125,25 @@ impl GlueMatcher {
     }
 }
 
+/// Refuses descriptors that are not whole, or not of the length that the network takes.
+pub(in crate::onnx) fn check(network: &dyn Network, query: &Features, goal: &Features) -> Result<(), PerceptionError> {
+    for features in [query, goal] {
+        let (keypoints, found) = (features.keypoints.len(), features.descriptors.len());
+        let expected = keypoints * features.dimension;
+        if expected != found {
+            return Err(PerceptionError::Features { keypoints, expected, found });
+        }
+    }
+    let wanted = network.inputs().get(2).and_then(|port| port.shape.last().copied().flatten());
+    if query.dimension != goal.dimension || wanted.is_some_and(|n| n != query.dimension) {
+        let goal = if query.dimension == goal.dimension { wanted.unwrap_or_default() } else { goal.dimension };
+        return Err(PerceptionError::Dimension { query: query.dimension, goal });
+    }
+    Ok(())
+}
+
 /// One image's part of the input.
-struct Side<'a> {
+pub(in crate::onnx) struct Side<'a> {
     n: usize,
     dimension: usize,
     positions: Vec<f32>,
@@ -152,7 +153,7 @@ struct Side<'a> {
 
 impl<'a> Side<'a> {
     /// Positions become (xy - (w, h) / 2) / (max(w, h) / 2).
-    fn of(features: &'a Features, keypoints_max: usize) -> Self {
+    pub fn of(features: &'a Features, keypoints_max: usize) -> Self {
         let n = features.keypoints.len().min(keypoints_max);
         let kept = &features.keypoints[..n];
         let (width, height) = (features.image_size_px.0 as f32, features.image_size_px.1 as f32);
@@ -169,7 +170,12 @@ impl<'a> Side<'a> {
 }
 
 /// In the order of the contract; models exported without a batch get none.
-fn inputs<'a>(query: &'a Side<'_>, goal: &'a Side<'_>, takes: Takes, ports: &[FoundPort]) -> Vec<Input<'a>> {
+pub(in crate::onnx) fn inputs<'a>(
+    query: &'a Side<'_>,
+    goal: &'a Side<'_>,
+    takes: Takes,
+    ports: &[FoundPort],
+) -> Vec<Input<'a>> {
     let positions = |s: &'a Side<'_>| Input { shape: vec![1, s.n, 2], data: &s.positions };
     let descriptors = |s: &'a Side<'_>| Input { shape: vec![1, s.n, s.dimension], data: s.descriptors };
     let scores = |s: &'a Side<'_>| Input { shape: vec![1, s.n], data: &s.scores };

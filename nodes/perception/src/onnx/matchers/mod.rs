@@ -1,6 +1,6 @@
 //! Matchers: one file per contract.
 
-mod glue;
+pub(super) mod glue;
 pub mod homing;
 pub mod lighterglue;
 pub mod lightglue;

@@ -1,5 +1,7 @@
 //! `homing bench tables`: the papers' tables, beside ours.
 
+mod report;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
@@ -19,6 +21,7 @@ use homing_sim::episode::Level;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::processes::Processes;
+use super::visual_target;
 use crate::Ended;
 use crate::settings::FeatureArgs;
 
@@ -70,6 +73,9 @@ pub struct TablesArgs {
     /// Run nothing; write the report of what there is.
     #[arg(long)]
     report: bool,
+    /// Write no report.
+    #[arg(long, conflicts_with = "report")]
+    no_report: bool,
 }
 
 /// Difficulties.
@@ -113,18 +119,50 @@ pub fn run(args: TablesArgs) -> anyhow::Result<Ended> {
         if let Ended::Interrupted = run_episodes(&args, &rows)? {
             return Ok(Ended::Interrupted);
         }
+        visual_targets(&args)?;
+    }
+    if !args.no_report {
+        println!("{}", report::write(&args.out, command(), notes())?);
+        eprintln!("written to {} as report.html, report.md and report.json", args.out.display());
     }
     Ok(Ended::Well)
 }
 
+/// Visual target navigation's pairs, unless they are there or were not asked for.
+fn visual_targets(args: &TablesArgs) -> anyhow::Result<()> {
+    let file = args.out.join(report::VISUAL_TARGET);
+    let partial = !(args.rows.is_empty() && args.levels.is_empty() && args.sets.is_empty());
+    if partial || file.exists() || args.shard != Shard::WHOLE {
+        return Ok(());
+    }
+    let n_each = if args.quick { 1 } else { 20 };
+    let part = args.out.join(format!("{}.part", report::VISUAL_TARGET));
+    visual_target::measure(n_each, &args.models, args.threads, &part)?;
+    std::fs::rename(&part, &file).with_context(|| format!("cannot write {}", file.display()))
+}
+
+fn command() -> String {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    format!("homing {}", words.join(" "))
+}
+
+fn notes() -> Vec<String> {
+    let flats = suite::sets::TEST_FLATS;
+    vec![
+        format!(
+            "Flats are generated; the {} test flats (seeds {} to {}) were never used to train or to tune.",
+            flats.end - flats.start,
+            flats.start,
+            flats.end - 1
+        ),
+        "Robot: radius 0.18 m, camera 640x480, 120 degrees, 1.25 m high, level; steps of 0.25 m and 15 degrees; no sliding; 500 steps."
+            .to_owned(),
+    ]
+}
+
 fn chosen_rows(args: &TablesArgs) -> anyhow::Result<Vec<Row>> {
-    let listed = |extractor: &str, matcher| -> anyhow::Result<FeatureChoice> {
-        let mut choice = FeatureChoice::listed(extractor, matcher, &args.models)?;
-        choice.run.threads = 1;
-        Ok(choice)
-    };
-    let own = listed(&args.features.extractor, args.features.matcher.as_deref())?;
-    let mut rows = suite::rows(&own, &listed("sift", None)?)?;
+    let own = FeatureChoice::listed(&args.features.extractor, args.features.matcher.as_deref(), &args.models)?;
+    let mut rows = suite::rows(&own, &args.models)?;
     if let Some(unknown) = args.rows.iter().find(|name| rows.iter().all(|r| r.name != name.as_str())) {
         let names: Vec<&str> = rows.iter().map(|r| r.name).collect();
         bail!("there is no row {unknown:?}; the rows are {}", names.join(", "));
