@@ -224,7 +224,12 @@ fn start(args: &DemoArgs, task: &Task, folder: &RunFolder, viewer: Option<PathBu
     let (noise, session) = (args.noise.name(), Network::listen(&args.endpoint));
     let sim = folder.write_toml("sim.toml", &SimFile { pace, noise, episode, session })?;
     let perception = folder.write_toml("perception.toml", &PerceptionFile::new(&args.features, network()))?;
-    let planner = PlannerFile { policy: args.policy.name(), session: network(), pace: PlannerPace { answer_ms_max } };
+    let planner = PlannerFile {
+        policy: args.policy.name(),
+        switches: None,
+        session: network(),
+        pace: PlannerPace { answer_ms_max },
+    };
     let planner = folder.write_toml("planner.toml", &planner)?;
     let monitor = MonitorFile {
         recording: folder.file("episode.rrd"),

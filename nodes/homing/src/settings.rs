@@ -39,6 +39,8 @@ pub struct PerceptionFile {
     pub features: FeaturesTable,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub matcher: Option<MatcherTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PoseTable>,
     pub session: Network,
 }
 
@@ -46,6 +48,14 @@ pub struct PerceptionFile {
 #[derive(Serialize)]
 pub struct FeaturesTable {
     pub extractor: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub switch: Option<&'static str>,
+}
+
+/// `[pose]` of perception.
+#[derive(Serialize)]
+pub struct PoseTable {
+    pub solver: &'static str,
 }
 
 /// `[matcher]` of perception.
@@ -75,8 +85,9 @@ impl FeatureArgs {
 impl PerceptionFile {
     pub fn new(features: &FeatureArgs, session: Network) -> Self {
         Self {
-            features: FeaturesTable { extractor: features.extractor.clone() },
+            features: FeaturesTable { extractor: features.extractor.clone(), switch: None },
             matcher: features.matcher.clone().map(|method| MatcherTable { method }),
+            pose: None,
             session,
         }
     }
@@ -85,8 +96,17 @@ impl PerceptionFile {
 #[derive(Serialize)]
 pub struct PlannerFile {
     pub policy: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub switches: Option<SwitchesTable>,
     pub session: Network,
     pub pace: PlannerPace,
+}
+
+/// `[switches]` of a planner.
+#[derive(Serialize)]
+pub struct SwitchesTable {
+    pub kind: &'static str,
+    pub recovery: &'static str,
 }
 
 #[derive(Serialize)]

@@ -21,7 +21,7 @@ pub const ABLATIONS: [(&str, &str); 8] = [
 ];
 
 /// The learned switch that comes with Homing.
-const LEARNED_SWITCH: &str = "homing-switch";
+pub const LEARNED_SWITCH: &str = "homing-switch";
 
 /// How to configure a row.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
+use homing_benchmark::ablations::LEARNED_SWITCH;
 use homing_benchmark::cause::Moment;
 use homing_benchmark::episode::{EpisodeRun, StageSeconds, headings};
 use homing_benchmark::suite::{Course, Onlooker, Row};
@@ -15,11 +16,14 @@ use homing_core::{
     Base, GoalEstimate, Mode, Motion, NavigationState, Odom, PlanarPose, Sighting, Stamp, Transform, UnseenReason,
 };
 use homing_perception::PoseSolver;
+use homing_perception::onnx::SwitchChoice;
+use homing_planner::{Recovery, SwitchConfig, SwitchKind};
 use homing_privileged::{GROUND_TRUTH, GroundTruth};
 use homing_protocol::convert::{EncodedPhoto, ToDomain};
 use homing_protocol::interfaces::{homing_msgs, nav_msgs};
 use homing_protocol::navigate::Outcome;
 use homing_protocol::{Session, Subscription, topics};
+use homing_sim::NoisePreset;
 use homing_sim::arena::Arena;
 use homing_sim::episode::Episode;
 use homing_sim::score::Finish;
@@ -31,7 +35,9 @@ use crate::meeting::{all_ready, fail_on_loss, join};
 use crate::mission::{self, Watched};
 use crate::run_folder::RunFolder;
 use crate::scorer::Scorer;
-use crate::settings::{FeatureArgs, Network, PerceptionFile, PlannerFile, PlannerPace, SimFile};
+use crate::settings::{
+    FeatureArgs, Network, PerceptionFile, PlannerFile, PlannerPace, PoseTable, SimFile, SwitchesTable,
+};
 
 /// More messages than an episode has steps.
 const HEARD_MAX: usize = 4000;
@@ -67,8 +73,8 @@ impl Processes {
         if *last_mile != LastMile::Driven {
             return refuse("teleports the robot, which its processes cannot do: run it without --through-processes");
         }
-        if row.perception.solver != PoseSolver::LoRansac {
-            return refuse("has another pose solver: run it without --through-processes");
+        if !NoisePreset::ALL.iter().any(|preset| preset.config() == row.trial.sim.noise) {
+            return refuse("has noise without a name: run it without --through-processes");
         }
         let mut features = features.clone();
         if row.features.extractor.name() == "sift" {
@@ -80,9 +86,13 @@ impl Processes {
     fn start(&self, episode: &Episode, folder: &RunFolder, endpoint: &str) -> anyhow::Result<Fleet> {
         let mut fleet = Fleet::default();
         let file = folder.write_json("episode.json", episode)?;
-        let body = SimFile { pace: "lockstep", episode: file.clone(), session: Network::listen(endpoint) };
+        let noise = NoisePreset::ALL.iter().find(|preset| preset.config() == self.row.trial.sim.noise);
+        let noise = noise.map_or("off", |preset| preset.name());
+        let body = SimFile { pace: "lockstep", noise, episode: file.clone(), session: Network::listen(endpoint) };
         fleet.start("body", "homing-sim", &folder.write_toml("body.toml", &body)?, folder)?;
-        let eyes = PerceptionFile::new(&self.features, Network::connect(endpoint));
+        let mut eyes = PerceptionFile::new(&self.features, Network::connect(endpoint));
+        eyes.pose = solver(self.row.perception.solver).map(|solver| PoseTable { solver });
+        eyes.features.switch = (self.row.features.switch != SwitchChoice::Geometry).then_some(LEARNED_SWITCH);
         fleet.start("perception", "homing-perception", &folder.write_toml("perception.toml", &eyes)?, folder)?;
         let (policy, discovery) = match self.row.trial.policy {
             Policy::Straight => ("straight", "own"),
@@ -92,7 +102,8 @@ impl Processes {
         };
         let goal_pose = if self.row.trial.goal_pose == GoalPose::Oracle { "oracle" } else { "own" };
         let pace = PlannerPace { answer_ms_max: 60_000 };
-        let planner = PlannerFile { policy, session: Network::connect(endpoint), pace };
+        let switches = Some(switches(&self.row.trial.planner.switches));
+        let planner = PlannerFile { policy, switches, session: Network::connect(endpoint), pace };
         if (discovery, goal_pose) == ("own", "own") {
             fleet.start("planner", "homing-planner", &folder.write_toml("planner.toml", &planner)?, folder)?;
         } else {
@@ -146,6 +157,26 @@ impl Course for Processes {
         let run = runtime.context("no threads").and_then(|r| r.block_on(self.mission(arena, episode, onlooker)));
         run.map_err(|e| RunError::Processes(format!("{e:#}").into()))
     }
+}
+
+/// The solver's name in perception's file; `None` for the default.
+fn solver(solver: PoseSolver) -> Option<&'static str> {
+    match solver {
+        PoseSolver::LoRansac => None,
+        PoseSolver::Gravity => Some("gravity"),
+        PoseSolver::EpnpRansac => Some("epnp_ransac"),
+        PoseSolver::SlingHeading => Some("sling_heading"),
+    }
+}
+
+fn switches(config: &SwitchConfig) -> SwitchesTable {
+    let kind = match config.kind {
+        SwitchKind::Fused => "fused",
+        SwitchKind::Sling => "sling",
+        SwitchKind::Learned { .. } => "learned",
+    };
+    let recovery = if config.recovery == Recovery::On { "on" } else { "off" };
+    SwitchesTable { kind, recovery }
 }
 
 /// What the processes said, by the stamp of the moment it is about.

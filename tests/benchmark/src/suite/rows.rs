@@ -93,8 +93,7 @@ pub fn rows(own: &FeatureChoice, models: &Path) -> Result<Vec<Row>, ChoiceError>
     };
     let with = |policy| Trial { policy, ..base.clone() };
     let noisy = |noise: NoisePreset| Trial { sim: SimConfig { noise: noise.config(), ..base.sim }, ..base.clone() };
-    let last_mile =
-        |goal_pose, last_mile| Trial { goal_pose, last_mile, sim: base.sim, ..base.clone() };
+    let last_mile = |goal_pose, last_mile| Trial { goal_pose, last_mile, sim: base.sim, ..base.clone() };
     let headline = |row| Row { headline: Headline::Yes, ..row };
     let mut rows = vec![
         headline(row("frontier", "ours: Frontier, own features, fused geometric switches", base.clone())),
@@ -112,10 +111,11 @@ pub fn rows(own: &FeatureChoice, models: &Path) -> Result<Vec<Row>, ChoiceError>
         let Some(ablation) = ablation(name, models)? else { continue };
         let mut row = row(name, what, Trial { planner: ablation.planner, ..base.clone() });
         row.perception = PerceptionConfig { threads: Some(1), ..ablation.perception };
+        let switch = ablation.features.switch.clone();
         if name == "sift" {
             row.features = ablation.features;
         }
-        row.features.switch = ablation.features.switch;
+        row.features.switch = switch;
         rows.push(row);
     }
     Ok(rows)
