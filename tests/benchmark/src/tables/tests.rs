@@ -1,5 +1,5 @@
 //! Reports of hand-made records, against figures worked out by hand.
-#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test may fail by panicking")]
+#![expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
 use homing_sim::episode::{Level, Shape};
 use homing_sim::score::{Finish, Score};
