@@ -4,7 +4,10 @@
 use std::sync::Arc;
 
 use homing_core::*;
-use homing_planner::{Frontier, Mission, Perception, Planner, PlannerConfig, PlannerObservation, StepEvent, Straight};
+use homing_planner::{
+    Frontier, Mission, Perception, Planner, PlannerConfig, PlannerObservation, Recovery, StepEvent, Straight,
+    SwitchConfig, SwitchKind,
+};
 use nalgebra::{Isometry3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -102,7 +105,11 @@ fn event() -> impl Strategy<Value = StepEvent> {
 }
 
 fn planner(policy: usize) -> Planner {
-    let config = PlannerConfig { map_side_m: 12.0, step_budget: 60, ..PlannerConfig::default() };
+    planner_with(policy, SwitchConfig::default())
+}
+
+fn planner_with(policy: usize, switches: SwitchConfig) -> Planner {
+    let config = PlannerConfig { map_side_m: 12.0, step_budget: 60, switches, ..PlannerConfig::default() };
     let discovery: Box<dyn GoalDiscovery> =
         if policy == 0 { Box::new(Straight::new()) } else { Box::new(Frontier::default()) };
     Planner::new(config, discovery).unwrap()
@@ -116,8 +123,11 @@ proptest! {
         events in prop::collection::vec((0_u64..8_000_000_000, event()), 1..30),
         sorted in any::<bool>(),
         policy in 0_usize..2,
+        kind in prop::sample::select(vec![SwitchKind::Fused, SwitchKind::Sling, SwitchKind::LEARNED]),
+        recovery in prop::sample::select(vec![Recovery::On, Recovery::Off]),
     ) {
-        let (mut a, mut b) = (planner(policy), planner(policy));
+        let switches = SwitchConfig { kind, recovery, ..SwitchConfig::default() };
+        let (mut a, mut b) = (planner_with(policy, switches), planner_with(policy, switches));
         let mut events = events;
         if sorted {
             // Plausible clocks let the garbage through to the later stages.

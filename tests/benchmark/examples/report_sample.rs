@@ -116,7 +116,7 @@ fn record(row: &str, set: &str, scene: &str, i: u64, chances: [f64; 3]) -> Episo
         cause: (!won).then(|| cause(rng.random_range(0..10))),
         reason: if won { "arrived".to_owned() } else { "gave up: nothing left to explore <10 cells & more".to_owned() },
         watch: Watch { n_steps: steps, ..Watch::default() },
-        first_heading_rad: (i % 5 != 0).then(|| (truth + rng.random_range(-0.08..0.08), truth)),
+        first_heading_rad: (!i.is_multiple_of(5)).then(|| (truth + rng.random_range(-0.08..0.08), truth)),
         times: StageSeconds {
             observe: 0.3 * wall_s,
             extract: 0.25 * wall_s,

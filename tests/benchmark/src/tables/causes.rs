@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::episodes::Episodes;
 use super::info::clip_path;
-use super::rows::HEADLINES;
 use crate::cause::Cause;
 
 /// What became of the episodes of one row on one set.
@@ -69,8 +68,10 @@ pub(super) fn by_cell(episodes: &Episodes<'_>) -> Vec<Causes> {
 
 /// Of the headline rows alone: an ablation is there to fail.
 pub(super) fn failures(episodes: &Episodes<'_>, clips: &BTreeSet<&str>) -> Vec<Failure> {
-    let cells = episodes.cells().filter(|(row, _)| HEADLINES.contains(row));
-    let lost = cells.flat_map(|(row, set)| episodes.of(row, set).into_values().filter(|e| !e.strict.success));
+    let lost = episodes
+        .headlines()
+        .into_iter()
+        .flat_map(|(row, set)| episodes.of(row, set).into_values().filter(|e| !e.strict.success));
     lost.map(|e| Failure {
         row: e.cell.row.clone(),
         set: e.cell.set.clone(),

@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use super::episodes::Episodes;
-use super::rows::HEADLINES;
 use crate::perception::Share;
 
 /// Edges of the bins of shortest paths, metres. The last bin is open.
@@ -16,7 +15,7 @@ pub struct Distances {
     pub row: String,
     /// The set.
     pub set: String,
-    /// The nearest first; a bin without episodes has `n` 0.
+    /// The nearest first; a bin without episodes has `n` 0. Those beyond the farthest episode are left out.
     pub bins: Vec<Bin>,
 }
 
@@ -44,8 +43,8 @@ impl Bin {
 }
 
 pub(super) fn by_cell(episodes: &Episodes<'_>) -> Vec<Distances> {
-    let cells = episodes.cells().filter(|(row, _)| HEADLINES.contains(row));
-    cells
+    let cells = episodes.headlines().into_iter();
+    let mut all: Vec<Distances> = cells
         .map(|(row, set)| {
             let group = episodes.of(row, set);
             let bin = |i: usize| {
@@ -56,5 +55,9 @@ pub(super) fn by_cell(episodes: &Episodes<'_>) -> Vec<Distances> {
             };
             Distances { row: row.to_owned(), set: set.to_owned(), bins: (0..EDGES_M.len()).map(bin).collect() }
         })
-        .collect()
+        .collect();
+    // No column for what no row of any set has.
+    let n_bins = all.iter().filter_map(|d| d.bins.iter().rposition(|b| b.success.n > 0)).max().map_or(0, |i| i + 1);
+    all.iter_mut().for_each(|d| d.bins.truncate(n_bins));
+    all
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use homing_sim::score::Score;
 
+use super::rows::{HEADLINES, headline_order, row_order, set_order};
 use crate::record::EpisodeRecord;
 
 /// The episodes of one row on one set, by scene and name.
@@ -43,20 +44,27 @@ impl<'a> Episodes<'a> {
     pub fn sets(&self) -> Vec<&'a str> {
         let mut sets: Vec<&str> = self.groups.keys().map(|(set, _)| *set).collect();
         sets.dedup();
-        sets.sort_by_key(|set| super::rows::set_order(set));
+        sets.sort_by_key(|set| set_order(set));
         sets
     }
 
     /// Rows that have episodes of a set, in the order of the tables.
     pub fn rows(&self, set: &str) -> Vec<&'a str> {
         let mut rows: Vec<&str> = self.groups.keys().filter(|(s, _)| *s == set).map(|(_, row)| *row).collect();
-        rows.sort_by_key(|row| super::rows::row_order(row));
+        rows.sort_by_key(|row| row_order(row));
         rows
     }
 
     /// Empty if there are none.
     pub fn of(&self, row: &str, set: &str) -> Group<'a> {
         self.groups.get(&(set, row)).cloned().unwrap_or_default()
+    }
+
+    /// Cells of the headline rows, set by set, ourselves first.
+    pub fn headlines(&self) -> Vec<(&'a str, &'a str)> {
+        let mut cells: Vec<_> = self.cells().filter(|(row, _)| HEADLINES.contains(row)).collect();
+        cells.sort_by_key(|(row, set)| (set_order(set), *set, headline_order(row)));
+        cells
     }
 
     /// Every cell that has episodes, set by set.

@@ -96,12 +96,25 @@ fn shown(entry: &Entry) -> String {
 /// Text that Markdown takes for nothing else, on one line.
 fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
         match c {
-            '|' | '<' | '`' => out.extend(['\\', c]),
+            '|' | '`' => out.extend(['\\', c]),
+            // A tag begins so; "<0.001" is none.
+            '<' if rest.peek().is_some_and(|c| c.is_ascii_alphabetic() || "/!?".contains(*c)) => out.push_str("\\<"),
             c if c.is_control() => out.push(' '),
             c => out.push(c),
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_no_markup_and_figures_stay_as_they_are() {
+        assert_eq!(plain("a|b <i> `c` <0.001 < 2\n</i>"), "a\\|b \\<i> \\`c\\` <0.001 < 2 \\</i>");
+    }
 }

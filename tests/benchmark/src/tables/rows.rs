@@ -6,7 +6,7 @@ pub const BASE: &str = "frontier";
 pub const HEADLINES: [&str; 3] = [BASE, "random", "straight"];
 /// Generated flats with NRNS's curved episodes.
 pub const CURVED: &str = "flats-curved";
-/// Floor plans of real flats, furnished.
+/// Rooms raised on the floor plans of real houses.
 pub const LAYOUTS: &str = "layouts";
 
 /// What a row of a published table is with us.
@@ -92,6 +92,11 @@ pub(super) fn name(key: &str) -> String {
 /// Where a row stands among others; rows that no table knows come last.
 pub(super) fn row_order(key: &str) -> usize {
     known().position(|r| r.key() == Some(key)).unwrap_or(usize::MAX)
+}
+
+/// Where a headline row stands among others, ourselves first.
+pub(super) fn headline_order(key: &str) -> usize {
+    HEADLINES.iter().position(|row| *row == key).unwrap_or(HEADLINES.len())
 }
 
 /// Where a set stands among others.

@@ -27,7 +27,11 @@ pub(in crate::tables) fn causes(title: &str, all: &[(String, &Causes)]) -> Optio
                 marks.push(Mark::Box { from, to, colour: tint, opacity: 1.0 });
             }
             if width >= WORDS_FROM {
-                marks.push(Mark::Inside { at: (x + 0.5 * width, i as f64 + 0.5), text: format!("{width:.0}") });
+                marks.push(Mark::Inside {
+                    at: (x + 0.5 * width, i as f64 + 0.5),
+                    text: format!("{width:.0}"),
+                    on: tint,
+                });
             }
             x += width;
         }

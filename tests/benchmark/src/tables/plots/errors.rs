@@ -3,7 +3,7 @@
 use super::picture::{Axis, Lines, Mark, Picture};
 use crate::perception::plots::style::colour;
 use crate::tables::episodes::{Episodes, finite};
-use crate::tables::rows::{self, HEADLINES};
+use crate::tables::rows;
 
 /// Errors at the end of one row on one set, ascending.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +25,9 @@ pub(in crate::tables) fn final_errors(episodes: &Episodes<'_>) -> Vec<FinalError
         values.sort_by(f64::total_cmp);
         values
     };
-    let cells = episodes.cells().filter(|(row, _)| HEADLINES.contains(row));
-    cells
+    episodes
+        .headlines()
+        .into_iter()
         .map(|(row, set)| {
             let group = episodes.of(row, set);
             let won = || group.values().filter(|e| e.strict.success);

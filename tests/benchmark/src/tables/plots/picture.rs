@@ -59,8 +59,15 @@ pub(in crate::tables) enum Mark {
     Dot { at: (f64, f64), colour: RGBColor },
     /// Words above a point.
     Above { at: (f64, f64), text: String },
-    /// Words around a point, white.
-    Inside { at: (f64, f64), text: String },
+    /// Words around a point, on this colour.
+    Inside { at: (f64, f64), text: String, on: RGBColor },
+}
+
+/// Black or white, by how bright a colour looks (Rec. 709 weights).
+fn readable_on(colour: RGBColor) -> &'static RGBColor {
+    let RGBColor(r, g, b) = colour;
+    let brightness = 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
+    if brightness > 130.0 { &BLACK } else { &WHITE }
 }
 
 impl Axis {
@@ -109,7 +116,7 @@ impl Picture {
         let inside = Inside {
             left: (MARGIN + 16 + LETTER_PX * longest).clamp(90, SIZE.0 / 2),
             right: SIZE.0 - 48,
-            top: legend_bottom + LINE + 22,
+            top: legend_bottom + LINE + 40,
             bottom: SIZE.1 - 108,
         };
         self.draw_axes(&area, &inside)?;
@@ -181,7 +188,9 @@ impl Picture {
             }
             Mark::Dot { at: point, colour } => area.draw(&Circle::new(at(*point), 9, colour.filled())),
             Mark::Above { at: point, text } => words(*point, text, ink(LETTERS - 5), VPos::Bottom, 6),
-            Mark::Inside { at: point, text } => words(*point, text, ink(LETTERS - 3).color(&WHITE), VPos::Center, 0),
+            Mark::Inside { at: point, text, on } => {
+                words(*point, text, ink(LETTERS - 3).color(readable_on(*on)), VPos::Center, 0)
+            }
         }
     }
 

@@ -9,7 +9,7 @@ use super::sling::{columns, our_row, published_row};
 use super::{sets, start};
 
 pub(super) fn section(report: &Report) -> Vec<Block> {
-    let mut rows = vec![Row::divider("Published, on Gibson scans")];
+    let mut rows = vec![Row::divider("Published, Gibson scans")];
     for published in SLING_2.rows {
         match published.number {
             8 => rows.push(Row::divider("Published: privileged last-mile navigation")),
@@ -20,7 +20,7 @@ pub(super) fn section(report: &Report) -> Vec<Block> {
     }
     let measured = |set: &&String| *set == CURVED || report.ablations.iter().any(|a| a.set == **set);
     for set in sets(report).iter().filter(measured) {
-        rows.push(Row::divider(format!("Ours, on {set}, by the strict rule")));
+        rows.push(Row::divider(format!("Ours, {set}, strict")));
         rows.extend(rows::SLING_2.iter().map(|row| our_row(report, set, row)));
     }
     let mut blocks = vec![

@@ -8,7 +8,8 @@ use super::{sets, start};
 use crate::cause::Cause;
 
 pub(super) fn section(report: &Report) -> Vec<Block> {
-    let headline: Vec<&Causes> = report.causes.iter().filter(|c| HEADLINES.contains(&c.row.as_str())).collect();
+    let mut headline: Vec<&Causes> = report.causes.iter().filter(|c| HEADLINES.contains(&c.row.as_str())).collect();
+    headline.sort_by_key(|c| (rows::set_order(&c.set), &c.set, rows::headline_order(&c.row)));
     let named: Vec<(String, &Causes)> =
         headline.iter().map(|c| (format!("{}, {}", rows::name(&c.row), c.set), *c)).collect();
     let mut blocks = vec![start("failures", "What was lost, and why")];

@@ -8,10 +8,10 @@ use super::sling::{columns, our_row, published_row};
 use super::start;
 
 pub(super) fn section(report: &Report) -> Vec<Block> {
-    let mut rows = vec![Row::divider("Published, on Gibson scans")];
+    let mut rows = vec![Row::divider("Published, Gibson scans")];
     rows.extend(SLING_1.numbered(11).map(published_row));
     rows.extend(FIELD.rows.iter().map(published_row));
-    rows.push(Row::divider(format!("Ours, on {CURVED}, by the strict rule")));
+    rows.push(Row::divider(format!("Ours, {CURVED}, strict")));
     rows.extend(rows::SLING_1.iter().filter(|r| r.key() == Some(BASE)).map(|r| our_row(report, CURVED, r)));
     let columns: Vec<Column> = columns();
     vec![

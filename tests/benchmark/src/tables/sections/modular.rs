@@ -10,7 +10,7 @@ pub(super) fn section(report: &Report) -> Vec<Block> {
     let mut columns = vec![Column::text("Model")];
     columns.extend(["Easy", "Medium", "Hard", "Overall"].map(|level| Column::number(level, "SR / SPL")));
     columns.push(Column::text("Remark"));
-    let mut rows = vec![Row::divider("Published, on Gibson scans")];
+    let mut rows = vec![Row::divider("Published, Gibson scans")];
     rows.extend(MODULAR.rows.iter().map(|r| {
         Row {
             kind: Kind::Published,
@@ -20,7 +20,7 @@ pub(super) fn section(report: &Report) -> Vec<Block> {
         }
     }));
     for set in sets(report) {
-        rows.push(Row::divider(format!("Ours, on {set}, by the strict rule")));
+        rows.push(Row::divider(format!("Ours, {set}, strict")));
         rows.extend(rows::MODULAR.iter().map(|row| our_row(report, &set, row)));
     }
     vec![

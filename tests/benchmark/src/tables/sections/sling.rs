@@ -7,10 +7,10 @@ use super::super::{BASE, Cell, Report, RowFigures};
 use super::{NEEDS_LEARNED, NOT_RUN, figures, sets, start};
 
 pub(super) fn section(report: &Report) -> Vec<Block> {
-    let mut rows = vec![Row::divider("Published, on Gibson scans")];
+    let mut rows = vec![Row::divider("Published, Gibson scans")];
     rows.extend(SLING_1.rows.iter().map(published_row));
     for set in sets(report) {
-        rows.push(Row::divider(format!("Ours, on {set}, by the strict rule")));
+        rows.push(Row::divider(format!("Ours, {set}, strict")));
         rows.extend(rows::SLING_1.iter().map(|row| our_row(report, &set, row)));
         rows.extend(others(report, &set));
     }
@@ -36,7 +36,7 @@ const OURS: &str = "Ours: percent of episodes and SPL times 100, easy 1.5 to 3 m
 /// SLING's columns, our own count by the published rules, and a remark.
 pub(super) fn columns() -> Vec<Column> {
     let mut columns = vec![Column::text("Method")];
-    for group in ["Overall", "Easy", "Medium", "Hard", "Published rules"] {
+    for group in ["Overall", "Easy", "Medium", "Hard", "Publ. rule"] {
         columns.extend(["Succ", "SPL"].map(|name| Column::number(group, name)));
     }
     columns.push(Column::text("Remark"));

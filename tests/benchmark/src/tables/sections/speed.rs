@@ -34,9 +34,9 @@ pub(super) fn section(report: &Report) -> Vec<Block> {
     blocks
 }
 
-const QUALITY: &str = "Per worker: a core that runs one episode after the other. Other: set-up, motion and records. SoftSPL: \
-     SPL with max(0, 1 - distance left / shortest path) in place of success. Distance left: geodesic, mean of all \
-     episodes; medians: of the successes alone. All episodes count, those above 10 m too.";
+const QUALITY: &str = "Per worker: a core that runs one episode after the other. Other: set-up, motion and records. \
+     SoftSPL, times 100: SPL with max(0, 1 - distance left / shortest path) in place of success. Distance left: geodesic, \
+     mean of all episodes; medians: of the successes alone. All episodes count, those above 10 m too.";
 
 fn link(report: &Report) -> Vec<Block> {
     let mut blocks = vec![start("link", "SPL by quality of the link")];

@@ -23,8 +23,8 @@ pub(super) fn section(report: &Report) -> Vec<Block> {
 
 const RULES: &str = "A robot is shown a photo and must drive to where it was taken. Our figures are by the strict rule: \
      success is the robot's own stop within 500 steps and within 1 m of the goal, measured along the shortest path. Figures \
-     that others published stand beside ours for orientation. They were measured on scans of real houses and counted by \
-     looser rules; ours are on scenes of our own. No figure mixes the two. Intervals hold the true value in 95 % of cases.";
+     that others published stand beside ours for orientation. They were measured on scans of real houses, and most were \
+     counted by looser rules; ours were measured in scenes of our simulator. No figure mixes the two. Intervals hold the true value in 95 % of cases.";
 
 fn counts(report: &Report) -> Vec<Block> {
     let mut notes = Vec::new();
@@ -37,7 +37,7 @@ fn counts(report: &Report) -> Vec<Block> {
             "{n} episodes have figures that are no numbers: such an SPL counts as 0, others are left out."
         )));
     }
-    notes.extend(report.info.notes.iter().cloned().map(Block::Note));
+    notes.extend(report.info.notes.iter().cloned().map(Block::Text));
     notes
 }
 
@@ -66,6 +66,6 @@ fn of_set(set: &str, row: &RowFigures) -> Vec<Tile> {
     };
     vec![
         tile("Success", format!("{} %", percent(cell.success.share)), cell.success.interval_95),
-        tile("SPL, times 100", percent(cell.spl.mean), cell.spl.interval_95),
+        tile("SPL \u{d7} 100", percent(cell.spl.mean), cell.spl.interval_95),
     ]
 }
