@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::constants::{HEIGHT_M, LASER_HEIGHT_M, RADIUS_M};
+use crate::flat::mapped::{self, MapError, NavMap};
 use crate::flat::{self, Detail, Rect};
 use crate::free_space::FreeSpace;
 use crate::gltf_scene::{self, SceneError};
@@ -29,6 +30,11 @@ pub enum SceneRef {
     Glb {
         /// Where it is.
         path: PathBuf,
+    },
+    /// Walls and furniture raised on a navigability map.
+    Layout {
+        /// Where the map is: an 8-bit PNG, see [`crate::flat::mapped`].
+        map: PathBuf,
     },
 }
 
@@ -56,6 +62,9 @@ pub enum ArenaError {
     /// Nobody can drive in it.
     #[error(transparent)]
     Floor(#[from] NavGridError),
+    /// The file is no navigability map.
+    #[error(transparent)]
+    Map(#[from] MapError),
 }
 
 /// A scene with everything derived from it for a robot of one size.
@@ -91,6 +100,7 @@ impl Arena {
                 (flat.scene, flat.rooms.iter().map(|r| r.cell).collect())
             }
             SceneRef::Glb { path } => (gltf_scene::load(path)?, Vec::new()),
+            SceneRef::Layout { map } => (mapped::build(&NavMap::read(map)?, detail), Vec::new()),
         };
         Self::of_scene(scene_ref.clone(), scene, rooms, size)
     }

@@ -9,6 +9,7 @@ pub mod follower;
 pub mod free_space;
 pub mod geodesic;
 pub mod gltf_scene;
+pub mod habitat;
 pub mod laser;
 pub mod nav_grid;
 mod raster;
