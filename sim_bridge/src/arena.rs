@@ -76,6 +76,7 @@ pub struct Arena {
     size: BodySize,
     grid: NavGrid,
     space: FreeSpace,
+    floor_y_m: f64,
     laser: LaserSlice,
     renderer: OnceLock<Mutex<Renderer>>,
 }
@@ -100,7 +101,11 @@ impl Arena {
                 (flat.scene, flat.rooms.iter().map(|r| r.cell).collect())
             }
             SceneRef::Glb { path } => (gltf_scene::load(path)?, Vec::new()),
-            SceneRef::Layout { map } => (mapped::build(&NavMap::read(map)?, detail), Vec::new()),
+            SceneRef::Layout { map } => {
+                let map = NavMap::read(map)?;
+                let arena = Self::of_scene(scene_ref.clone(), mapped::build(&map, detail), Vec::new(), size)?;
+                return Ok(Self { floor_y_m: map.floor_y_m, ..arena });
+            }
         };
         Self::of_scene(scene_ref.clone(), scene, rooms, size)
     }
@@ -113,8 +118,8 @@ impl Arena {
         let grid = NavGrid::new(&scene, size.height_m)?;
         let space = grid.free_space(&scene.name, size.radius_m)?;
         let laser = LaserSlice::new(&scene, grid.floor_z_m() + LASER_HEIGHT_M);
-        let scene = Arc::new(scene);
-        Ok(Self { scene_ref, scene, rooms, size, grid, space, laser, renderer: OnceLock::new() })
+        let (scene, floor_y_m) = (Arc::new(scene), grid.floor_z_m());
+        Ok(Self { scene_ref, scene, rooms, size, grid, space, floor_y_m, laser, renderer: OnceLock::new() })
     }
 
     /// Which scene it is.
@@ -145,6 +150,13 @@ impl Arena {
     #[must_use]
     pub fn space(&self) -> &FreeSpace {
         &self.space
+    }
+
+    /// Height of the floor in the frame of the scene's own episodes, metres (Habitat's y): that of the world frame, unless a
+    /// map says otherwise.
+    #[must_use]
+    pub fn floor_y_m(&self) -> f64 {
+        self.floor_y_m
     }
 
     /// The outline at the laser's height.

@@ -5,6 +5,7 @@ pub mod body;
 pub mod constants;
 pub mod episode;
 pub mod flat;
+pub mod folds;
 pub mod follower;
 pub mod free_space;
 pub mod geodesic;

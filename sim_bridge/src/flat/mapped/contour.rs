@@ -12,9 +12,8 @@ const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 /// stands in them clockwise. Straightened by at most `tolerance_m` metres.
 pub(super) fn outlines(floor: &Floor, tolerance_m: f64) -> Vec<Vec<Point>> {
     let g = &floor.geometry;
-    let metres = |(c, r): (i64, i64)| {
-        (g.origin_x_m + c as f64 * g.resolution_m, g.origin_y_m + r as f64 * g.resolution_m)
-    };
+    let metres =
+        |(c, r): (i64, i64)| (g.origin_x_m + c as f64 * g.resolution_m, g.origin_y_m + r as f64 * g.resolution_m);
     let loops = trace(floor).into_iter().map(|corners| corners.into_iter().map(metres).collect::<Vec<Point>>());
     loops.map(|corners| straightened(&corners, tolerance_m)).filter(|corners| corners.len() >= 3).collect()
 }
@@ -68,9 +67,8 @@ fn straightened(corners: &[Point], tolerance_m: f64) -> Vec<Point> {
     let Some(&any) = corners.first() else { return Vec::new() };
     let first = farthest(any);
     let turned: Vec<Point> = corners[first..].iter().chain(&corners[..=first]).copied().collect();
-    let second = turned.iter().enumerate().max_by(|a, b| {
-        distance(turned[0], *a.1).total_cmp(&distance(turned[0], *b.1))
-    });
+    let second =
+        turned.iter().enumerate().max_by(|a, b| distance(turned[0], *a.1).total_cmp(&distance(turned[0], *b.1)));
     let second = second.map_or(0, |(i, _)| i);
     let mut kept = vec![false; turned.len()];
     let mut stack = vec![(0, second), (second, turned.len() - 1)];
@@ -116,7 +114,8 @@ pub(super) fn triangulated(corners: &[Point]) -> Vec<[Point; 3]> {
             let t = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
             turn(t[0], t[1], t[2]) > 1e-12 && !left.iter().any(|p| !t.contains(p) && holds(&t, *p))
         });
-        let Some(i) = ear.or_else(|| (0..n).find(|&i| turn(left[(i + n - 1) % n], left[i], left[(i + 1) % n]).abs() <= 1e-12))
+        let Some(i) =
+            ear.or_else(|| (0..n).find(|&i| turn(left[(i + n - 1) % n], left[i], left[(i + 1) % n]).abs() <= 1e-12))
         else {
             return triangles;
         };
@@ -172,7 +171,9 @@ mod tests {
     #[test]
     fn a_staircase_becomes_a_slanting_wall() {
         let rows: Vec<String> = (0..20_usize)
-            .map(|r| (0..24_usize).map(|c| if c > 0 && c < 2 + r && r > 0 && r < 19 && c < 23 { '.' } else { '#' }).collect())
+            .map(|r| {
+                (0..24_usize).map(|c| if c > 0 && c < 2 + r && r > 0 && r < 19 && c < 23 { '.' } else { '#' }).collect()
+            })
             .collect();
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let loops = outlines(&floor(&rows), 0.75);

@@ -30,13 +30,7 @@ pub(super) struct RoomLook {
 }
 
 /// Draws one stretch of wall up to a height, metres, with what hangs on it.
-pub(super) fn wall(
-    scene: &mut SceneBuilder,
-    stretch: &Stretch,
-    room: &RoomLook,
-    height_m: f64,
-    rng: &mut ChaCha8Rng,
-) {
+pub(super) fn wall(scene: &mut SceneBuilder, stretch: &Stretch, room: &RoomLook, height_m: f64, rng: &mut ChaCha8Rng) {
     let length = stretch.length_m();
     let pen = &mut scene.pen(Spot::new(stretch.from.0, stretch.from.1, 0).turned(stretch.yaw_rad()));
     let surface = if length > 1.5 && rng.random_bool(0.3) { &room.accent } else { &room.look.wall };

@@ -98,11 +98,14 @@ fn lid(scene: &mut SceneBuilder, corners: &[Point], height: f64, look: &Look) {
     let around: Vec<Point> = corners.iter().rev().copied().collect();
     let mesh = scene.mesh(look, Contact::Solid);
     for triangle in triangulated(&around) {
-        push_fan(mesh, &triangle.map(|(x, y)| Vertex {
-            position: [x as f32, y as f32, height as f32],
-            normal: [0.0, 0.0, 1.0],
-            uv: [(x / side) as f32, (y / side) as f32],
-        }));
+        push_fan(
+            mesh,
+            &triangle.map(|(x, y)| Vertex {
+                position: [x as f32, y as f32, height as f32],
+                normal: [0.0, 0.0, 1.0],
+                uv: [(x / side) as f32, (y / side) as f32],
+            }),
+        );
     }
 }
 

@@ -36,11 +36,13 @@ pub const AGENT_RADIUS_M: f64 = 0.1;
 /// Height of those agents, metres (Habitat's default).
 pub const AGENT_HEIGHT_M: f64 = 1.5;
 /// Walls are straightened by at most this, metres: less than what the floor is wider than the agent's radius.
-const STRAIGHTENED_M: f64 = 0.06;
+const STRAIGHTENED_M: f64 = 0.08;
 /// Rooms with a stock of looks of their own; further rooms share them.
 const STYLES_MAX: usize = 8;
 /// Pictures in a room's stock.
 const POSTERS: usize = 8;
+/// Share of rooms whose walls may be plain plaster.
+const PLAIN_SHARE: f64 = 0.3;
 /// Floor for which one lamp is enough, square metres.
 const LAMP_M2: f64 = 11.0;
 /// Pieces of floor overlap by this, metres, so that no crack shows between them.
@@ -79,7 +81,11 @@ fn room_look(rng: &mut ChaCha8Rng) -> RoomLook {
     let mut style = Style::draw(rng);
     style.posters = (0..POSTERS).map(|_| Look::of(Surface::Poster, rng.next_u64())).collect();
     let kinds = [Living, Kitchen, Bedroom, Study, Dining, Child, Living, Study, Corridor, Bath];
-    let look = style.room(*pick(&kinds, rng), rng);
+    let mut look = style.room(*pick(&kinds, rng), rng);
+    if !rng.random_bool(PLAIN_SHARE) {
+        let bold = [Surface::Wallpaper, Surface::Wallpaper, Surface::Brick, Surface::Tile, Surface::WoodFloor];
+        look.wall = Look::of(*pick(&bold, rng), rng.next_u64());
+    }
     let other = style.room(*pick(&[Living, Study], rng), rng).wall;
     let accent = if other == look.wall { Look::of(Surface::Wallpaper, rng.next_u64()) } else { other };
     RoomLook { style, look, accent }

@@ -195,13 +195,8 @@ mod tests {
     use super::*;
 
     fn map(rows: &[&str], resolution_m: f64) -> NavMap {
-        let geometry = GridGeometry {
-            width: rows[0].len(),
-            height: rows.len(),
-            resolution_m,
-            origin_x_m: 0.0,
-            origin_y_m: 0.0,
-        };
+        let geometry =
+            GridGeometry { width: rows[0].len(), height: rows.len(), resolution_m, origin_x_m: 0.0, origin_y_m: 0.0 };
         let navigable = rows.iter().flat_map(|r| r.bytes().map(|b| b == b'.')).collect();
         NavMap { name: "drawn".into(), geometry, navigable, floor_y_m: 0.0 }
     }

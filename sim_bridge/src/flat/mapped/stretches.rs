@@ -70,10 +70,7 @@ fn runs(from: Point, to: Point, before: u32, regions: &Regions) -> Vec<(f64, f64
     let mut runs: Vec<(f64, f64, u32)> = Vec::new();
     for k in 0..n {
         let s = (f64::from(k) + 0.5) / f64::from(n);
-        let p = (
-            from.0 + s * (to.0 - from.0) + BEFORE_M * left.0,
-            from.1 + s * (to.1 - from.1) + BEFORE_M * left.1,
-        );
+        let p = (from.0 + s * (to.0 - from.0) + BEFORE_M * left.0, from.1 + s * (to.1 - from.1) + BEFORE_M * left.1);
         let room = regions.at(p).or_else(|| runs.last().map(|r| r.2)).unwrap_or(before);
         let end = f64::from(k + 1) / f64::from(n);
         match runs.last_mut() {

@@ -80,8 +80,12 @@ impl Floor {
                 }
             }
         }
-        let mut cells: Vec<(u32, usize)> =
-            nearest.into_iter().enumerate().filter(|(i, d)| *d < u32::MAX && !self.open[*i]).map(|(i, d)| (d, i)).collect();
+        let mut cells: Vec<(u32, usize)> = nearest
+            .into_iter()
+            .enumerate()
+            .filter(|(i, d)| *d < u32::MAX && !self.open[*i])
+            .map(|(i, d)| (d, i))
+            .collect();
         cells.sort_unstable();
         cells
     }
@@ -139,7 +143,8 @@ mod tests {
                         let (c, r) = (column + dc, row + dr);
                         let inside =
                             c >= 0 && r >= 0 && c < floor.geometry.width as i64 && r < floor.geometry.height as i64;
-                        if inside && !core::mem::replace(&mut seen[floor.geometry.index(c as usize, r as usize)], true) {
+                        if inside && !core::mem::replace(&mut seen[floor.geometry.index(c as usize, r as usize)], true)
+                        {
                             stack.push(floor.geometry.index(c as usize, r as usize));
                         }
                     }
