@@ -1,5 +1,6 @@
 //! Renders a scene to PNG: `snapshot SCENE PREFIX X,Y,YAW_DEG[,Z[,PITCH_DEG]] ...` writes PREFIX_0.png (colour) and
-//! PREFIX_0_depth.png for every pose. SCENE is a glTF file or the seed of a flat.
+//! PREFIX_0_depth.png for every pose. SCENE is a glTF file, the seed of a flat, or a
+//! navigability map (.png).
 
 #![expect(clippy::unwrap_used, reason = "a tool for looking at scenes may fail by panicking")]
 
@@ -7,6 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use homing_core::{Camera, DepthImage, Intrinsics, RgbImage, Transform};
+use homing_sim::flat::Detail;
+use homing_sim::flat::mapped::{self, NavMap};
 use homing_sim::render::{Render, Renderer};
 use homing_sim::scene::{Scene, World};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -28,10 +31,11 @@ fn main() {
     }
 }
 
-/// A number is the seed of a flat, anything else a glTF file.
+/// A number is the seed of a flat, a PNG a map, anything else a glTF file.
 fn load(scene: &str) -> Scene {
     match scene.parse() {
         Ok(seed) => homing_sim::flat::generate(seed).scene,
+        Err(_) if scene.ends_with(".png") => mapped::build(&NavMap::read(Path::new(scene)).unwrap(), Detail::Full),
         Err(_) => homing_sim::gltf_scene::load(Path::new(scene)).unwrap(),
     }
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::constants::{HEIGHT_M, LASER_HEIGHT_M, RADIUS_M};
+use crate::flat::mapped::{self, MapError, NavMap};
 use crate::flat::{self, Detail, Rect};
 use crate::free_space::FreeSpace;
 use crate::gltf_scene::{self, SceneError};
@@ -29,6 +30,11 @@ pub enum SceneRef {
     Glb {
         /// Where it is.
         path: PathBuf,
+    },
+    /// Walls and furniture raised on a navigability map.
+    Layout {
+        /// Where the map is: an 8-bit PNG, see [`crate::flat::mapped`].
+        map: PathBuf,
     },
 }
 
@@ -56,6 +62,9 @@ pub enum ArenaError {
     /// Nobody can drive in it.
     #[error(transparent)]
     Floor(#[from] NavGridError),
+    /// The file is no navigability map.
+    #[error(transparent)]
+    Map(#[from] MapError),
 }
 
 /// A scene with everything derived from it for a robot of one size.
@@ -67,6 +76,7 @@ pub struct Arena {
     size: BodySize,
     grid: NavGrid,
     space: Arc<FreeSpace>,
+    floor_y_m: f64,
     laser: LaserSlice,
     renderer: OnceLock<Mutex<Renderer>>,
 }
@@ -91,6 +101,11 @@ impl Arena {
                 (flat.scene, flat.rooms.iter().map(|r| r.cell).collect())
             }
             SceneRef::Glb { path } => (gltf_scene::load(path)?, Vec::new()),
+            SceneRef::Layout { map } => {
+                let map = NavMap::read(map)?;
+                let arena = Self::of_scene(scene_ref.clone(), mapped::build(&map, detail), Vec::new(), size)?;
+                return Ok(Self { floor_y_m: map.floor_y_m, ..arena });
+            }
         };
         Self::of_scene(scene_ref.clone(), scene, rooms, size)
     }
@@ -103,8 +118,8 @@ impl Arena {
         let grid = NavGrid::new(&scene, size.height_m)?;
         let space = Arc::new(grid.free_space(&scene.name, size.radius_m)?);
         let laser = LaserSlice::new(&scene, grid.floor_z_m() + LASER_HEIGHT_M);
-        let scene = Arc::new(scene);
-        Ok(Self { scene_ref, scene, rooms, size, grid, space, laser, renderer: OnceLock::new() })
+        let (scene, floor_y_m) = (Arc::new(scene), grid.floor_z_m());
+        Ok(Self { scene_ref, scene, rooms, size, grid, space, floor_y_m, laser, renderer: OnceLock::new() })
     }
 
     /// Which scene it is.
@@ -135,6 +150,13 @@ impl Arena {
     #[must_use]
     pub fn space(&self) -> &Arc<FreeSpace> {
         &self.space
+    }
+
+    /// Height of the floor in the frame of the scene's own episodes, metres (Habitat's y): that of the world frame, unless a
+    /// map says otherwise.
+    #[must_use]
+    pub fn floor_y_m(&self) -> f64 {
+        self.floor_y_m
     }
 
     /// The outline at the laser's height.

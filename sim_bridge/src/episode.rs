@@ -10,6 +10,7 @@ use thiserror::Error;
 use crate::arena::{Arena, SceneRef};
 use crate::constants::{
     CAMERA_HEIGHT, CAMERA_HEIGHT_M, CAMERA_HFOV_RAD, CAMERA_WIDTH, CURVED_HEADING_RAD, CURVED_RATIO, GOAL_DEPTH_M_MIN,
+    SUCCESS_M,
 };
 use crate::geodesic::GeodesicField;
 use crate::laser::LaserSlice;
@@ -27,13 +28,20 @@ pub struct FloorPose {
     pub yaw_rad: f64,
 }
 
+impl FloorPose {
+    /// The same in decimals that a file gives back.
+    pub(crate) fn written(self) -> Self {
+        Self { x_m: written(self.x_m), y_m: written(self.y_m), yaw_rad: written(self.yaw_rad) }
+    }
+}
+
 impl From<FloorPose> for PlanarPose {
     fn from(p: FloorPose) -> Self {
         PlanarPose { x_m: p.x_m, y_m: p.y_m, yaw_rad: p.yaw_rad }
     }
 }
 
-/// A level camera on a pole: what took the goal photo.
+/// A camera on a pole: what took the goal photo.
 #[derive(Copy, Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Viewpoint {
@@ -45,12 +53,21 @@ pub struct Viewpoint {
     pub height: u32,
     /// Horizontal field of view, radians.
     pub hfov_rad: f64,
+    /// How far it looks up, radians; negative down. Robots' own cameras are level.
+    #[serde(default)]
+    pub pitch_rad: f64,
 }
 
 impl Default for Viewpoint {
     /// The robot's own camera.
     fn default() -> Self {
-        Self { height_m: CAMERA_HEIGHT_M, width: CAMERA_WIDTH, height: CAMERA_HEIGHT, hfov_rad: CAMERA_HFOV_RAD }
+        Self {
+            height_m: CAMERA_HEIGHT_M,
+            width: CAMERA_WIDTH,
+            height: CAMERA_HEIGHT,
+            hfov_rad: CAMERA_HFOV_RAD,
+            pitch_rad: 0.0,
+        }
     }
 }
 
@@ -63,11 +80,12 @@ impl Viewpoint {
         Intrinsics::from_hfov(self.width, self.height, self.hfov_rad)
     }
 
-    /// Where the camera sits on a body that stands on the floor: level, looking ahead.
+    /// Where the camera sits on a body that stands on the floor: looking ahead, tilted by its pitch.
     #[must_use]
     pub fn t_base_camera(&self) -> Transform<Base, Camera> {
         // Columns: the camera's right, down and forward in the base's axes.
-        let r = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        let (s, c) = (libm::sin(self.pitch_rad), libm::cos(self.pitch_rad));
+        let r = Matrix3::new(0.0, s, c, -1.0, 0.0, 0.0, 0.0, -c, s);
         Transform::from_rotation(&r, Vector3::new(0.0, 0.0, self.height_m))
     }
 
@@ -107,16 +125,40 @@ pub struct Episode {
     pub shortest_path_m: f64,
     /// Straight or curved, by NRNS's rule.
     pub shape: Shape,
+    /// What a published set calls it; drawn episodes have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    /// Where to stop, world frame, metres: at any of these places. None means where the photo was taken.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub view_points: Vec<(f64, f64)>,
+    /// How near to that place is success, metres.
+    #[serde(default = "success_m")]
+    pub success_m: f64,
+}
+
+/// The success distance of episodes that state none.
+fn success_m() -> f64 {
+    SUCCESS_M
 }
 
 /// NRNS's two kinds of episode.
-#[derive(Copy, Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Copy, Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
     /// The way is hardly longer than the straight line, and the headings agree.
     Straight,
     /// The rest.
     Curved,
+}
+
+impl Shape {
+    /// The shape of an episode whose shortest path is so long, metres.
+    #[must_use]
+    pub fn of(start: FloorPose, goal: FloorPose, shortest_path_m: f64) -> Self {
+        let straight_m = libm::hypot(goal.x_m - start.x_m, goal.y_m - start.y_m);
+        let turned = wrap_angle(goal.yaw_rad - start.yaw_rad).abs() >= CURVED_HEADING_RAD;
+        if shortest_path_m >= CURVED_RATIO * straight_m || turned { Shape::Curved } else { Shape::Straight }
+    }
 }
 
 /// Difficulty by the length of the shortest path (NRNS; "extra" after Mezghani et al.).
@@ -286,23 +328,30 @@ fn candidate(
         return None;
     }
     let goal_yaw_rad = arrival_yaw(&field.path(start.0, start.1)?);
-    let straight_m = libm::hypot(goal.0 - start.0, goal.1 - start.1);
-    let turned = wrap_angle(goal_yaw_rad - yaw_rad).abs() >= CURVED_HEADING_RAD;
-    let curved = shortest_path_m >= CURVED_RATIO * straight_m || turned;
-    let shape = if curved { Shape::Curved } else { Shape::Straight };
+    // A uniform heading that must agree with the goal's is uniform over those that do: no need to draw until one does.
+    let yaw_rad = match spec.shape {
+        Some(Shape::Straight) => wrap_angle(goal_yaw_rad + yaw_rad / core::f64::consts::PI * CURVED_HEADING_RAD),
+        _ => yaw_rad,
+    };
+    let start = FloorPose { x_m: start.0, y_m: start.1, yaw_rad };
+    let goal = FloorPose { x_m: goal.0, y_m: goal.1, yaw_rad: goal_yaw_rad };
+    let shape = Shape::of(start, goal, shortest_path_m);
     (spec.shape.is_none_or(|s| s == shape)).then(|| Episode {
         scene: arena.scene_ref().clone(),
         seed,
-        start: FloorPose { x_m: written(start.0), y_m: written(start.1), yaw_rad: written(yaw_rad) },
-        goal: FloorPose { x_m: written(goal.0), y_m: written(goal.1), yaw_rad: written(goal_yaw_rad) },
+        start: start.written(),
+        goal: goal.written(),
         camera: spec.camera,
         shortest_path_m: written(shortest_path_m),
         shape,
+        id: None,
+        view_points: Vec::new(),
+        success_m: SUCCESS_M,
     })
 }
 
 /// To the micrometre and microradian: decimals that JSON gives back bit for bit.
-fn written(value: f64) -> f64 {
+pub(crate) fn written(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 

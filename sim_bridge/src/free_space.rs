@@ -59,6 +59,22 @@ impl FreeSpace {
         self.geometry.cell_at(x_m, y_m).is_some_and(|(c, r)| self.free[self.geometry.index(c, r)])
     }
 
+    /// The point itself if it is free, else the centre of the nearest free cell at most `within_m` metres away; world
+    /// frame, metres.
+    #[must_use]
+    pub fn nearest(&self, x_m: f64, y_m: f64, within_m: f64) -> Option<(f64, f64)> {
+        if self.contains(x_m, y_m) {
+            return Some((x_m, y_m));
+        }
+        let g = &self.geometry;
+        let cell = |v: f64, origin: f64, n: usize| (((v - origin) / g.resolution_m).max(0.0) as usize).min(n);
+        let columns = cell(x_m - within_m, g.origin_x_m, g.width)..cell(x_m + within_m, g.origin_x_m, g.width - 1) + 1;
+        let rows = cell(y_m - within_m, g.origin_y_m, g.height)..cell(y_m + within_m, g.origin_y_m, g.height - 1) + 1;
+        let free = rows.flat_map(|r| columns.clone().map(move |c| (c, r))).filter(|(c, r)| self.free[g.index(*c, *r)]);
+        let far = |p: &(f64, f64)| libm::hypot(p.0 - x_m, p.1 - y_m);
+        free.map(|(c, r)| g.centre(c, r)).filter(|p| far(p) <= within_m).min_by(|a, b| far(a).total_cmp(&far(b)))
+    }
+
     /// True if every cell on the straight line between two points is free.
     #[must_use]
     pub fn line_is_free(&self, from: (f64, f64), to: (f64, f64)) -> bool {

@@ -4,9 +4,12 @@ use homing_core::{PlanarPose, wrap_angle};
 use serde::{Deserialize, Serialize};
 
 use crate::arena::Arena;
-use crate::constants::{STEPS_MAX, SUCCESS_M};
+use crate::constants::STEPS_MAX;
 use crate::episode::Episode;
 use crate::geodesic::GeodesicField;
+
+/// A robot that touches something stands at most this far from the nearest free cell, metres.
+const BESIDE_M: f64 = 0.25;
 
 /// How a robot ended. Ground truth.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -46,26 +49,45 @@ pub struct Finish {
     pub final_heading_error_rad: f64,
     /// Motions that an obstacle cut short.
     pub collisions: u64,
+    /// How near is success, metres.
+    pub success_m: f64,
 }
 
 impl Finish {
-    /// Measures how a robot ended against its task.
+    /// Measures how a robot ended against its task: distances are to the nearest of its view points, or to the photo's place
+    /// where it has none.
     #[must_use]
     pub fn new(arena: &Arena, episode: &Episode, ending: &Ending) -> Self {
-        let goal = (episode.goal.x_m, episode.goal.y_m);
-        let field = GeodesicField::to(arena.space(), goal).ok();
+        let (final_distance_m, final_straight_m) = distances_left(arena, episode, (ending.pose.x_m, ending.pose.y_m));
         Self {
             stopped: ending.stopped,
             steps: ending.steps,
             last_mile_steps: ending.last_mile_steps,
             path_length_m: ending.path_length_m,
             shortest_path_m: episode.shortest_path_m,
-            final_distance_m: field.and_then(|f| f.distance_m(ending.pose.x_m, ending.pose.y_m)),
-            final_straight_m: ending.pose.distance_to(goal.0, goal.1),
+            final_distance_m,
+            final_straight_m,
             final_heading_error_rad: ending.pose.yaw_rad - episode.goal.yaw_rad,
             collisions: ending.collisions,
+            success_m: episode.success_m,
         }
     }
+}
+
+/// From a place to where the episode ends, metres: along the floor, if there is a way, and straight.
+fn distances_left(arena: &Arena, episode: &Episode, at: (f64, f64)) -> (Option<f64>, f64) {
+    let straight = |p: (f64, f64)| libm::hypot(p.0 - at.0, p.1 - at.1);
+    let goal = (episode.goal.x_m, episode.goal.y_m);
+    if episode.view_points.is_empty() {
+        let field = GeodesicField::to(arena.space(), goal).ok();
+        return (field.and_then(|f| f.distance_m(at.0, at.1)), straight(goal));
+    }
+    // Ways are as long there as back: one field from here serves all view points.
+    let here = arena.space().nearest(at.0, at.1, BESIDE_M);
+    let field = here.and_then(|p| GeodesicField::to(arena.space(), p).ok());
+    let ways = field.iter().flat_map(|f| episode.view_points.iter().filter_map(|p| f.distance_m(p.0, p.1)));
+    let nearest = episode.view_points.iter().map(|p| straight(*p)).fold(f64::MAX, f64::min);
+    (ways.min_by(f64::total_cmp).map(|way| way.max(nearest)), nearest)
 }
 
 /// What a scorer says.
@@ -92,21 +114,21 @@ pub struct Score {
 }
 
 impl Score {
-    /// The strict score, Habitat's: success is the robot's own stop within [`STEPS_MAX`] actions and [`SUCCESS_M`] geodesic
-    /// metres of the goal.
+    /// The strict score, Habitat's: success is the robot's own stop within [`STEPS_MAX`] actions and the episode's success
+    /// distance of the goal along the floor.
     #[must_use]
     pub fn strict(finish: &Finish) -> Self {
         let distance = finish.final_distance_m;
-        let success = finish.stopped && finish.steps <= STEPS_MAX && distance.is_some_and(|d| d <= SUCCESS_M);
+        let success = finish.stopped && finish.steps <= STEPS_MAX && distance.is_some_and(|d| d <= finish.success_m);
         Self::new(finish, success, distance.unwrap_or(finish.final_straight_m))
     }
 
-    /// The score as NRNS and SLING counted: success is to be within [`SUCCESS_M`] straight metres of the goal, walls or not,
+    /// The score as NRNS and SLING counted: success is to be within the success distance of the goal, walls or not,
     /// stopped or not, while fewer than [`STEPS_MAX`] actions went by, those of the last mile not counted.
     #[must_use]
     pub fn published(finish: &Finish) -> Self {
         let counted = finish.steps.saturating_sub(finish.last_mile_steps);
-        let success = counted < STEPS_MAX && finish.final_straight_m <= SUCCESS_M;
+        let success = counted < STEPS_MAX && finish.final_straight_m <= finish.success_m;
         Self::new(finish, success, finish.final_straight_m)
     }
 
@@ -143,6 +165,7 @@ mod tests {
         final_straight_m: 0.3,
         final_heading_error_rad: -0.1,
         collisions: 2,
+        success_m: 1.0,
     };
 
     #[test]
@@ -188,6 +211,14 @@ mod tests {
         fails(Finish { final_distance_m: Some(1.000_1), ..GOOD });
         fails(Finish { final_distance_m: None, ..GOOD });
         assert!(Score::strict(&Finish { steps: STEPS_MAX, final_distance_m: Some(1.0), ..GOOD }).success);
+    }
+
+    #[test]
+    fn both_scorers_take_the_episode_s_own_success_distance() {
+        let near = Finish { success_m: 0.1, final_distance_m: Some(0.12), final_straight_m: 0.12, ..GOOD };
+        assert!(!Score::strict(&near).success && !Score::published(&near).success);
+        let at = Finish { final_distance_m: Some(0.1), final_straight_m: 0.1, ..near };
+        assert!(Score::strict(&at).success && Score::published(&at).success);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod furnish;
 mod furniture;
 mod geometry;
 mod layout;
+pub mod mapped;
 mod passable;
 mod pen;
 mod relight;

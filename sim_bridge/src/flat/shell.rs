@@ -174,12 +174,15 @@ pub(super) fn build_room(
 
 /// Which way a slab looks.
 #[derive(Copy, Clone, PartialEq, Eq)]
-enum Facing {
+pub(super) enum Facing {
+    /// A floor.
     Up,
+    /// A ceiling.
     Down,
 }
 
-fn slab(pen: &mut Pen<'_>, look: &Look, area: &Rect, z: f64, facing: Facing) {
+/// A level rectangle at a height, metres.
+pub(super) fn slab(pen: &mut Pen<'_>, look: &Look, area: &Rect, z: f64, facing: Facing) {
     let (xs, ys) = (cuts(area.x0, area.x1, &[]), cuts(area.y0, area.y1, &[]));
     for x in xs.windows(2) {
         for y in ys.windows(2) {
@@ -210,7 +213,7 @@ fn wall(pen: &mut Pen<'_>, look: &Look, length: f64, height_m: f64, openings: &[
 }
 
 /// From `from` to `to` through all `marks`, in pieces no longer than [`PIECE_M`].
-fn cuts(from: f64, to: f64, marks: &[f64]) -> Vec<f64> {
+pub(super) fn cuts(from: f64, to: f64, marks: &[f64]) -> Vec<f64> {
     let mut fixed: Vec<f64> = marks.iter().copied().filter(|m| *m > from && *m < to).collect();
     fixed.extend([from, to]);
     fixed.sort_by(f64::total_cmp);

@@ -156,6 +156,9 @@ impl<'a> Robot<'a> {
             camera: self.camera,
             shortest_path_m: way_m.unwrap_or_else(|| pair.distance_m()),
             shape: Shape::Curved,
+            id: None,
+            view_points: Vec::new(),
+            success_m: homing_sim::constants::SUCCESS_M,
         };
         let (mut end, mut looks) = (pair.start, Vec::new());
         let mut follow = |step: &StepRecord<'_>| {
