@@ -93,27 +93,6 @@ impl FreeSpace {
         Some(self.geometry.centre(index % self.geometry.width, index / self.geometry.width))
     }
 
-    /// Centre of the free cell nearest to a point, no farther than `within_m`; world frame, metres.
-    #[must_use]
-    pub fn nearest(&self, x_m: f64, y_m: f64, within_m: f64) -> Option<(f64, f64)> {
-        let g = &self.geometry;
-        let reach = (within_m / g.resolution_m).ceil() as i64;
-        let cell = |v: f64, origin: f64| ((v - origin) / g.resolution_m).floor() as i64;
-        let (column, row) = (cell(x_m, g.origin_x_m), cell(y_m, g.origin_y_m));
-        let mut best: Option<(f64, (f64, f64))> = None;
-        for r in (row - reach).max(0)..(row + reach + 1).min(g.height as i64) {
-            for c in (column - reach).max(0)..(column + reach + 1).min(g.width as i64) {
-                let (c, r) = (c as usize, r as usize);
-                let centre = g.centre(c, r);
-                let away = libm::hypot(centre.0 - x_m, centre.1 - y_m);
-                if self.free[g.index(c, r)] && away <= within_m && best.is_none_or(|(least, _)| away < least) {
-                    best = Some((away, centre));
-                }
-            }
-        }
-        best.map(|(_, at)| at)
-    }
-
     /// Number of free cells.
     #[must_use]
     pub fn len(&self) -> usize {

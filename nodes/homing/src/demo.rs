@@ -222,11 +222,12 @@ fn start(args: &DemoArgs, task: &Task, folder: &RunFolder, viewer: Option<PathBu
         None => Some(folder.write_json("truth.json", &task.truth()?)?),
     };
     let (noise, session) = (args.noise.name(), Network::listen(&args.endpoint));
-    let sim = folder.write_toml("sim.toml", &SimFile { pace, noise, episode, session })?;
+    let sim = folder.write_toml("sim.toml", &SimFile { pace, noise, radius_m: None, episode, session })?;
     let perception = folder.write_toml("perception.toml", &PerceptionFile::new(&args.features, network()))?;
     let planner = PlannerFile {
         policy: args.policy.name(),
         switches: None,
+        body: None,
         session: network(),
         pace: PlannerPace { answer_ms_max },
     };

@@ -30,6 +30,8 @@ impl Network {
 pub struct SimFile {
     pub pace: &'static str,
     pub noise: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
     pub episode: PathBuf,
     pub session: Network,
 }
@@ -98,8 +100,16 @@ pub struct PlannerFile {
     pub policy: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub switches: Option<SwitchesTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyTable>,
     pub session: Network,
     pub pace: PlannerPace,
+}
+
+/// `[body]` of a planner.
+#[derive(Serialize)]
+pub struct BodyTable {
+    pub radius_m: f64,
 }
 
 /// `[switches]` of a planner.

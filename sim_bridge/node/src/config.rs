@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use homing_protocol::process::SessionSettings;
 use homing_sim::body::Sliding;
-use homing_sim::{NoiseConfig, NoisePreset, SceneRef, SimConfig, Viewpoint};
+use homing_sim::{BodySize, NoiseConfig, NoisePreset, SceneRef, SimConfig, Viewpoint};
 use serde::Deserialize;
 
 /// `sim.toml`.
@@ -21,6 +21,8 @@ pub struct Config {
     pub seed: u64,
     /// A glTF scene instead of a generated flat.
     pub glb: Option<PathBuf>,
+    /// Radius of the robot, metres.
+    pub radius_m: f64,
     /// What is noisy, by name.
     pub noise: NoisePreset,
     /// Combined with the episode's seed: another trial of the same episode.
@@ -52,6 +54,7 @@ impl Default for Config {
             episode: None,
             seed: 0,
             glb: None,
+            radius_m: BodySize::default().radius_m,
             noise: NoisePreset::default(),
             noise_seed: 0,
             depth_distortion: None,
@@ -68,6 +71,11 @@ impl Config {
             Some(path) => SceneRef::Glb { path: path.clone() },
             None => SceneRef::Flat { seed: self.seed },
         }
+    }
+
+    /// How large the robot is.
+    pub fn body(&self) -> BodySize {
+        BodySize { radius_m: self.radius_m, ..BodySize::default() }
     }
 
     /// The robot.

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use homing_core::{PlanarPose, Resettable, RobotBridge};
 use homing_privileged::GroundTruth;
 use homing_sim::noise::Distortion;
-use homing_sim::{Arena, BodySize, Episode, EpisodeSpec, Simulator, episode};
+use homing_sim::{Arena, Episode, EpisodeSpec, Simulator, episode};
 
 use crate::config::Config;
 
@@ -23,7 +23,7 @@ impl World {
     pub fn open(config: &Config) -> anyhow::Result<Self> {
         let given = config.episode.as_deref().map(read_episode).transpose()?;
         let scene = given.as_ref().map_or_else(|| config.scene(), |e| e.scene.clone());
-        let arena = Arc::new(Arena::load(&scene, BodySize::default())?);
+        let arena = Arc::new(Arena::load(&scene, config.body())?);
         let episode = match given {
             Some(episode) => episode,
             None => {

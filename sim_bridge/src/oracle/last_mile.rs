@@ -46,11 +46,7 @@ pub fn perfect(
 #[must_use]
 pub fn landing(arena: &Arena, from: PlanarPose, prediction: PlanarPose) -> Option<(PlanarPose, f64)> {
     let space = arena.space();
-    let (x_m, y_m) = if space.contains(prediction.x_m, prediction.y_m) {
-        (prediction.x_m, prediction.y_m)
-    } else {
-        space.nearest(prediction.x_m, prediction.y_m, LANDING_M)?
-    };
+    let (x_m, y_m) = space.nearest(prediction.x_m, prediction.y_m, LANDING_M)?;
     let way_m = GeodesicField::to(space, (x_m, y_m)).ok()?.distance_m(from.x_m, from.y_m)?;
     Some((PlanarPose { x_m, y_m, yaw_rad: prediction.yaw_rad }, way_m))
 }

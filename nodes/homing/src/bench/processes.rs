@@ -36,7 +36,7 @@ use crate::mission::{self, Watched};
 use crate::run_folder::RunFolder;
 use crate::scorer::Scorer;
 use crate::settings::{
-    FeatureArgs, Network, PerceptionFile, PlannerFile, PlannerPace, PoseTable, SimFile, SwitchesTable,
+    BodyTable, FeatureArgs, Network, PerceptionFile, PlannerFile, PlannerPace, PoseTable, SimFile, SwitchesTable,
 };
 
 /// More messages than an episode has steps.
@@ -83,12 +83,18 @@ impl Processes {
         Ok(Self { row: row.clone(), features, out })
     }
 
-    fn start(&self, episode: &Episode, folder: &RunFolder, endpoint: &str) -> anyhow::Result<Fleet> {
+    fn start(&self, radius_m: f64, episode: &Episode, folder: &RunFolder, endpoint: &str) -> anyhow::Result<Fleet> {
         let mut fleet = Fleet::default();
         let file = folder.write_json("episode.json", episode)?;
         let noise = NoisePreset::ALL.iter().find(|preset| preset.config() == self.row.trial.sim.noise);
         let noise = noise.map_or("off", |preset| preset.name());
-        let body = SimFile { pace: "lockstep", noise, episode: file.clone(), session: Network::listen(endpoint) };
+        let body = SimFile {
+            pace: "lockstep",
+            noise,
+            radius_m: Some(radius_m),
+            episode: file.clone(),
+            session: Network::listen(endpoint),
+        };
         fleet.start("body", "homing-sim", &folder.write_toml("body.toml", &body)?, folder)?;
         let mut eyes = PerceptionFile::new(&self.features, Network::connect(endpoint));
         eyes.pose = solver(self.row.perception.solver).map(|solver| PoseTable { solver });
@@ -103,7 +109,13 @@ impl Processes {
         let goal_pose = if self.row.trial.goal_pose == GoalPose::Oracle { "oracle" } else { "own" };
         let pace = PlannerPace { answer_ms_max: 60_000 };
         let switches = Some(switches(&self.row.trial.planner.switches));
-        let planner = PlannerFile { policy, switches, session: Network::connect(endpoint), pace };
+        let planner = PlannerFile {
+            policy,
+            switches,
+            body: Some(BodyTable { radius_m }),
+            session: Network::connect(endpoint),
+            pace,
+        };
         if (discovery, goal_pose) == ("own", "own") {
             fleet.start("planner", "homing-planner", &folder.write_toml("planner.toml", &planner)?, folder)?;
         } else {
@@ -122,7 +134,7 @@ impl Processes {
     ) -> anyhow::Result<EpisodeRun> {
         let folder = RunFolder::create(&self.out, &format!("{}-{}", self.row.name, episode.seed))?;
         let endpoint = format!("tcp/127.0.0.1:{}", free_port()?);
-        let mut fleet = self.start(episode, &folder, &endpoint)?;
+        let mut fleet = self.start(arena.size().radius_m, episode, &folder, &endpoint)?;
         let session = join(&endpoint, &mut fleet).await?;
         let mut heard = Heard::open(&session)?;
         let mut scorer = Scorer::open(&session)?;

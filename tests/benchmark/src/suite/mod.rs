@@ -14,5 +14,5 @@ pub use course::{Course, InProcess, LayCourse, Onlooker};
 pub use plan::{Amounts, Plan, Task};
 pub use rows::{Row, rows};
 pub use run::{RunOptions, run};
-pub use sets::{EpisodeRef, EpisodeSource};
+pub use sets::{EpisodeRef, EpisodeSource, SetError};
 pub use store::{Header, Shard, Store, StoreError};

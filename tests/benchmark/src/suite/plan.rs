@@ -6,9 +6,10 @@ use homing_sim::arena::SceneRef;
 use homing_sim::episode::{Level, Shape};
 
 use super::rows::{Headline, Row};
-use super::sets::{self, EpisodeRef};
+use super::sets::{self, EpisodeRef, Photographer};
 use super::store::Shard;
 use crate::record::{CellKey, EpisodeRecord};
+use crate::tables::CURVED;
 
 /// Episodes for each cell.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -44,35 +45,37 @@ pub struct Plan {
     pub groups: Vec<Vec<Task>>,
 }
 
+/// Generated flats with NRNS's straight episodes.
+pub const STRAIGHT: &str = "flats-straight";
+/// Generated flats, curved episodes, photos taken by people.
+pub const FREE_VIEW: &str = "flats-free-view";
 /// Rounds in which the cells fill.
 const ROUNDS: usize = 4;
 
 impl Plan {
-    /// The folds on flats for all rows, and the sets of `more` for headline rows.
+    /// For every row the curved folds on flats; for the first row besides them the straight folds, photos taken by people, and
+    /// the sets of `more`.
     #[must_use]
     pub fn new(rows: &[Row], amounts: Amounts, more: &[(String, Vec<EpisodeRef>)]) -> Self {
-        let mut groups = Vec::new();
-        for round in 0..ROUNDS {
-            for (index, row) in rows.iter().enumerate() {
-                let n = match row.headline {
-                    Headline::Yes => amounts.headline,
-                    Headline::No => amounts.others,
-                };
-                for (set, shape) in [("flats-curved", Shape::Curved), ("flats-straight", Shape::Straight)] {
-                    if shape == Shape::Straight && row.headline == Headline::No {
-                        continue;
-                    }
-                    let part = |level| share(&sets::flats(shape, level, n), round);
-                    let episodes: Vec<EpisodeRef> = Level::ALL[..3].iter().flat_map(|level| part(*level)).collect();
-                    groups.extend(by_scene(index, set, episodes));
-                }
-                if index == 0 {
-                    for (set, episodes) in more {
-                        groups.extend(by_scene(index, set, share(episodes, round)));
-                    }
-                }
+        let fold = |shape, n, photographer| -> Vec<EpisodeRef> {
+            Level::ALL[..3].iter().flat_map(|level| sets::flats(shape, *level, n, photographer)).collect()
+        };
+        let mut cells: Vec<(usize, String, Vec<EpisodeRef>)> = Vec::new();
+        for (index, row) in rows.iter().enumerate() {
+            let n = match row.headline {
+                Headline::Yes => amounts.headline,
+                Headline::No => amounts.others,
+            };
+            cells.push((index, CURVED.to_owned(), fold(Shape::Curved, n, Photographer::Robot)));
+            if index == 0 {
+                cells.extend(more.iter().map(|(set, episodes)| (index, set.clone(), episodes.clone())));
+                let n = amounts.others;
+                cells.push((index, STRAIGHT.to_owned(), fold(Shape::Straight, n, Photographer::Robot)));
+                cells.push((index, FREE_VIEW.to_owned(), fold(Shape::Curved, n, Photographer::Person)));
             }
         }
+        let rounds = (0..ROUNDS).flat_map(|round| cells.iter().map(move |cell| (round, cell)));
+        let groups = rounds.flat_map(|(round, (row, set, all))| by_scene(*row, set, share(all, round))).collect();
         Self { groups }
     }
 
@@ -115,10 +118,9 @@ impl Plan {
     }
 }
 
-/// A round's part of a list.
+/// A round's part of a list: every so many of it, so that each round has all levels.
 fn share(episodes: &[EpisodeRef], round: usize) -> Vec<EpisodeRef> {
-    let at = |round: usize| episodes.len() * round / ROUNDS;
-    episodes[at(round)..at(round + 1)].to_vec()
+    episodes.iter().skip(round).step_by(ROUNDS).cloned().collect()
 }
 
 fn by_scene(row: usize, set: &str, episodes: Vec<EpisodeRef>) -> Vec<Vec<Task>> {
@@ -160,7 +162,8 @@ mod tests {
             tasks.iter().filter(|t| t.row == index && t.set == set && t.episode.level == level).count()
         };
         assert_eq!(of("frontier", "flats-curved", Level::Hard), 9);
-        assert_eq!(of("frontier", "flats-straight", Level::Easy), 9);
+        assert_eq!(of("frontier", "flats-straight", Level::Easy), 5);
+        assert_eq!(of("frontier", FREE_VIEW, Level::Easy), 5);
         assert_eq!(of("straight", "flats-curved", Level::Medium), 5);
         assert_eq!(of("straight", "flats-straight", Level::Medium), 0);
         let mut names: Vec<String> = tasks.iter().map(|t| format!("{} {} {}", t.row, t.set, t.episode.id)).collect();

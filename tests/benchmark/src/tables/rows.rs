@@ -44,7 +44,7 @@ pub(super) const SLING_1: [OurRow; 6] = [
     learned("SLING + OVRL-GD", 11),
 ];
 
-pub(super) const SLING_2: [OurRow; 16] = [
+pub(super) const SLING_2: [OurRow; 17] = [
     learned("NRNS", 1),
     measured(BASE, "Homing (frontier)", Some(2)),
     measured("mlp-switch", "w/ MLP Switch", Some(3)),
@@ -52,6 +52,7 @@ pub(super) const SLING_2: [OurRow; 16] = [
     measured("sift", "w/o Neural Features (SIFT)", Some(5)),
     measured("pose-noise", "w/ Pose Noise", Some(6)),
     measured("pose-depth-noise", "w/ Pose & Depth Noise", Some(7)),
+    measured("all-noise", "w/ all noise (wheels, blur, JPEG too)", None),
     measured("oracle-lp", "w/ Oracle-LP", Some(8)),
     measured("oracle-lm-pose", "w/ Oracle-LM-Pose", Some(9)),
     measured("oracle-lm-pose-lp", "w/ Oracle-LM-Pose & Oracle-LP", Some(10)),

@@ -12,12 +12,14 @@ use clap::{Args, ValueEnum};
 use homing_benchmark::clip::ClipFolder;
 use homing_benchmark::suite::run::GoOn;
 use homing_benchmark::suite::{
-    self, Amounts, Course, Header, InProcess, LayCourse, Plan, Row, RunOptions, Shard, Store,
+    self, Amounts, Course, EpisodeRef, Header, InProcess, LayCourse, Plan, Row, RunOptions, Shard, Store,
 };
+use homing_benchmark::tables::LAYOUTS;
 use homing_benchmark::{EpisodeRecord, RunError};
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::onnx::registry::FOLDER;
 use homing_sim::episode::Level;
+use homing_sim::folds::Split;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::processes::Processes;
@@ -43,6 +45,15 @@ pub struct TablesArgs {
     /// Episodes for each level of the other rows.
     #[arg(long, value_name = "N")]
     others: Option<usize>,
+    /// Habitat episode files (ImageNav, InstanceImageNav or NRNS; .json or .json.gz) to run, too, as the set "layouts".
+    #[arg(long, value_name = "FOLDER")]
+    episodes: Option<PathBuf>,
+    /// Where their scenes are, .glb files or navigability maps, if not beside them.
+    #[arg(long, value_name = "FOLDER", requires = "episodes")]
+    scenes: Option<PathBuf>,
+    /// Episodes of each of their scenes and levels; all without it.
+    #[arg(long, value_name = "N", requires = "episodes")]
+    per_scene: Option<usize>,
     /// Only these rows (see the report for their names); may be given several times.
     #[arg(long = "row", value_name = "NAME")]
     rows: Vec<String>,
@@ -147,7 +158,7 @@ fn command() -> String {
 }
 
 fn notes() -> Vec<String> {
-    let flats = suite::sets::TEST_FLATS;
+    let flats = Split::Test.flats();
     vec![
         format!(
             "Flats are generated; the {} test flats (seeds {} to {}) were never used to train or to tune.",
@@ -177,7 +188,7 @@ fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
         Amounts { headline: args.headline.unwrap_or(preset.headline), others: args.others.unwrap_or(preset.others) };
     let header = Header::new(rows.iter().map(|r| (r.name.to_owned(), r.config())).collect());
     let (store, done) = Store::open(&args.out, &header, args.shard)?;
-    let mut whole = Plan::new(rows, amounts, &[]);
+    let mut whole = Plan::new(rows, amounts, &given(args)?);
     whole.keep(|task| {
         (args.levels.is_empty() || args.levels.iter().any(|l| l.level() == task.episode.level))
             && (args.sets.is_empty() || args.sets.contains(&task.set))
@@ -212,6 +223,18 @@ fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
         return Ok(Ended::Interrupted);
     }
     Ok(Ended::Well)
+}
+
+/// The sets that the user gave.
+fn given(args: &TablesArgs) -> anyhow::Result<Vec<(String, Vec<EpisodeRef>)>> {
+    let Some(folder) = &args.episodes else { return Ok(Vec::new()) };
+    let set = suite::sets::from_files(folder, args.scenes.as_ref().unwrap_or(folder))?;
+    eprintln!("{}: {} episodes", folder.display(), set.episodes.len());
+    for (reason, n) in &set.refused {
+        eprintln!("  {n} left out: {reason}");
+    }
+    let per_scene = args.per_scene.or(args.quick.then_some(1)).unwrap_or(usize::MAX);
+    Ok(vec![(LAYOUTS.to_owned(), suite::sets::thinned(&set.episodes, per_scene))])
 }
 
 fn say(bar: &ProgressBar, tally: &Mutex<(usize, usize)>, record: &EpisodeRecord) {
