@@ -11,8 +11,6 @@ pub const N_SECTORS: u32 = 16;
 const PLACE_M: f64 = 0.5;
 const N_RAYS: usize = 60;
 const RAY_STEP_M: f64 = 0.1;
-/// How far into the unknown a view is hoped to reach, metres.
-const HOPE_M: f64 = 1.5;
 
 /// How alike two views must be for one to stand for the other.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -94,14 +92,20 @@ impl Coverage {
         nearest.into_iter().enumerate().filter(|(_, n)| n.0 < i64::MAX).map(|(at, n)| (at, n.1)).collect()
     }
 
-    /// Places in line of sight of a cell.
-    pub fn in_sight(&mut self, map: &OccupancyGrid, (column, row): (usize, usize), range_m: f64) -> Vec<Place> {
+    /// Places in line of sight of a cell, at most `range_m` away. A view is hoped to reach `hope_m` into the unknown.
+    pub fn in_sight(
+        &mut self,
+        map: &OccupancyGrid,
+        (column, row): (usize, usize),
+        range_m: f64,
+        hope_m: f64,
+    ) -> Vec<Place> {
         if self.fan_range_m != range_m {
             self.fan = fan(range_m, map.geometry.resolution_m);
             self.fan_range_m = range_m;
         }
         self.stamp_now = self.stamp_now.wrapping_add(1);
-        let hope = (HOPE_M / RAY_STEP_M) as u32;
+        let hope = (hope_m / RAY_STEP_M) as u32;
         let (width, height) = (map.geometry.width, map.geometry.height);
         let mut places = Vec::new();
         for ray in &self.fan {

@@ -26,6 +26,13 @@ pub struct FrontierConfig {
     pub gain_min_m2: f64,
     /// An unknown place is worth this share of a known one.
     pub unknown_worth: f64,
+    /// How far into the unknown a view is hoped to reach, metres.
+    pub hope_m: f64,
+    /// What a metre of way takes off the worth of what lies there, as an exponent: whoever goes far leaves much behind, and
+    /// comes back for it. So near things are seen first, and a look around is finished before a long way.
+    pub decay_per_m: f64,
+    /// That fades, and is gone after so many steps: looking around costs steps, and they are counted, too.
+    pub patient_steps: u64,
     /// Added to the way: near targets do not win by being near alone, metres.
     pub way_offset_m: f64,
     /// Another target must be this much better than the present one.
@@ -43,6 +50,9 @@ impl Default for FrontierConfig {
             turn_cost_m: 0.08,
             gain_min_m2: 0.8,
             unknown_worth: 0.5,
+            hope_m: 2.5,
+            decay_per_m: 0.25,
+            patient_steps: 200,
             way_offset_m: 1.0,
             hysteresis: 1.3,
             hint_rad: 0.45,
@@ -56,7 +66,6 @@ struct Viewpoint {
     x_m: f64,
     y_m: f64,
     place: usize,
-    gain_m2: f64,
     utility: f64,
 }
 
@@ -120,7 +129,7 @@ impl GoalDiscovery for Frontier {
                 return Directive::Exhausted;
             };
             let viewpoints = self.coverage.find_reachable(view.map, view.travel_m);
-            let places = self.coverage.in_sight(view.map, here, likeness.range_m);
+            let places = self.coverage.in_sight(view.map, here, likeness.range_m, self.config.hope_m);
             self.coverage.look(&places, view.pose.yaw_rad, &likeness);
             let target = self.choose(view, &viewpoints, &likeness);
             if let Some(turn) = self.look_around(view, &places, &likeness, target) {
@@ -199,6 +208,8 @@ impl Frontier {
             self.barren.push(target.place);
         }
         self.candidates.clear();
+        let patience = (1.0 - view.step as f64 / self.config.patient_steps.max(1) as f64).max(0.0);
+        let decay_per_m = self.config.decay_per_m * patience;
         for &(place, (column, row)) in viewpoints {
             let kept = self.target.is_some_and(|t| t.place == place);
             let checkered = (column / 10 + row / 10) % 2 == 0;
@@ -207,7 +218,7 @@ impl Frontier {
             }
             let at = view.map.geometry.centre(column, row);
             let travel_m = f64::from(view.travel_m[view.map.geometry.index(column, row)]);
-            let places = self.coverage.in_sight(view.map, (column, row), likeness.range_m);
+            let places = self.coverage.in_sight(view.map, (column, row), likeness.range_m, self.config.hope_m);
             let gain_m2 = self.coverage.gain_m2(&places, self.config.unknown_worth);
             if gain_m2 < self.config.gain_min_m2 {
                 continue;
@@ -215,8 +226,8 @@ impl Frontier {
             let favour = hinted(view.hints, at, self.config.hint_rad);
             let turns = view.pose.bearing_to(at.0, at.1).abs() / self.config.turn_rad;
             let cost_m = travel_m + self.config.way_offset_m + self.config.turn_cost_m * turns;
-            let utility = gain_m2 * favour / cost_m;
-            self.candidates.push(Viewpoint { x_m: at.0, y_m: at.1, place, gain_m2, utility });
+            let utility = gain_m2 * favour * libm::exp(-decay_per_m * travel_m) / cost_m;
+            self.candidates.push(Viewpoint { x_m: at.0, y_m: at.1, place, utility });
         }
         self.candidates.sort_by(|a, b| b.utility.total_cmp(&a.utility).then(a.place.cmp(&b.place)));
         let best = self.candidates.first().copied();
