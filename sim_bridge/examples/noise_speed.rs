@@ -1,4 +1,5 @@
-//! Milliseconds of noise on a 640x480 image: `noise_speed [rounds]`, on all cores and on one.
+//! Milliseconds of noise on a 640x480 image: `noise_speed [rounds]`, on all cores and on one. The processor time (all
+//! threads, from /proc) does not depend on what else the machine is doing.
 
 #![expect(clippy::unwrap_used, reason = "a measuring tool may fail by panicking")]
 
@@ -22,12 +23,22 @@ fn measure(name: &str, rounds: u64) {
     let lens = Intrinsics::from_hfov(640, 480, 120_f64.to_radians()).unwrap();
     let time = |what: &str, work: &dyn Fn(u64)| {
         work(0);
-        let begin = Instant::now();
+        let (begin, begin_cpu) = (Instant::now(), cpu_ms());
         (1..=rounds).for_each(work);
-        println!("{name}: {what} {:.2} ms an image", begin.elapsed().as_secs_f64() * 1e3 / rounds as f64);
+        let (wall, cpu) = (begin.elapsed().as_secs_f64() * 1e3, cpu_ms() - begin_cpu);
+        let n = rounds as f64;
+        println!("{name}: {what} {:.2} ms an image, {:.2} ms of processor time", wall / n, cpu / n);
     };
     time("depth", &|seed| _ = depth::redwood(&metres, &DepthNoise::default(), None, seed).unwrap());
     let raw = CameraNoise { jpeg_quality: None, ..CameraNoise::default() };
     time("colour", &|seed| _ = camera::expose(&colours, &raw, &lens, 0.5, seed).unwrap());
     time("colour with JPEG", &|seed| _ = camera::expose(&colours, &CameraNoise::default(), &lens, 0.5, seed).unwrap());
+}
+
+/// User time of all threads of this process, ms.
+fn cpu_ms() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let after_name = stat.rsplit(')').next().unwrap();
+    // Field 14 of the whole line, in ticks of 10 ms.
+    after_name.split_whitespace().nth(11).unwrap().parse::<f64>().unwrap() * 10.0
 }

@@ -210,10 +210,12 @@ mod tests {
             let n = image.data().len() as f64;
             (image.data().iter().map(|d| f64::from(d - depth_m).powi(2)).sum::<f64>() / n).sqrt()
         };
-        // d^2 / 35.13 times the disparity's deviation, 0.0278 of noise and 0.125 / sqrt(12) of quantisation together.
-        for (depth_m, expected) in [(2.03_f32, 0.0053), (4.07, 0.0215), (8.11, 0.0855)] {
-            let found = deviation(depth_m);
-            assert!((found / expected - 1.0).abs() < 0.35, "{depth_m} m: {found} for {expected}");
+        // At a depth of exactly n steps the error of 0.0278 px is 0.222 steps: 2.45 % of the pixels are more than half a step
+        // off and one step wrong, a deviation of 0.156 steps of depth / n each.
+        for steps in [138.0_f32, 69.0, 35.0] {
+            let depth_m = 281.04 / steps;
+            let (found, expected) = (deviation(depth_m), f64::from(0.1564 * depth_m / steps));
+            assert!((found / expected - 1.0).abs() < 0.1, "{depth_m} m: {found} for {expected}");
         }
     }
 
