@@ -240,14 +240,14 @@ impl Row {
         episode: &Episode,
         record: &StepRecord<'_>,
         way_m: f64,
-        field: &GeodesicField<'_>,
+        field: &GeodesicField,
     ) {
-        self.watch.see(arena, episode, record);
+        self.watch.see(arena, episode, &record.moment());
         let pose = record.pose_truth;
         if is_in_view(arena, episode, pose) {
             self.view_m.get_or_insert(way_m);
         }
-        if self.found_m.is_none() && right_pose(record) == Some(true) {
+        if self.found_m.is_none() && right_pose(&record.moment()) == Some(true) {
             self.found_m = Some(way_m);
             self.left_m = field.distance_m(pose.x_m, pose.y_m).unwrap_or(f64::NAN);
         }

@@ -136,6 +136,7 @@ impl Plan {
             goal_id: 1,
             sighting,
             n_matches: 0,
+            switch_probability: None,
             matched_points: Vec::new(),
             times: StageTimes::default(),
         }
