@@ -234,14 +234,7 @@ fn event(
 }
 
 impl Row {
-    fn see(
-        &mut self,
-        arena: &Arena,
-        episode: &Episode,
-        record: &StepRecord<'_>,
-        way_m: f64,
-        field: &GeodesicField,
-    ) {
+    fn see(&mut self, arena: &Arena, episode: &Episode, record: &StepRecord<'_>, way_m: f64, field: &GeodesicField) {
         self.watch.see(arena, episode, &record.moment());
         let pose = record.pose_truth;
         if is_in_view(arena, episode, pose) {

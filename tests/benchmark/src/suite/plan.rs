@@ -49,9 +49,6 @@ pub struct Plan {
 pub const STRAIGHT: &str = "flats-straight";
 /// Generated flats, curved episodes, photos taken by people.
 pub const FREE_VIEW: &str = "flats-free-view";
-/// Rounds in which the cells fill.
-const ROUNDS: usize = 4;
-
 impl Plan {
     /// For every row the curved folds on flats; for the first row besides them the straight folds, photos taken by people, and
     /// the sets of `more`.
@@ -74,8 +71,11 @@ impl Plan {
                 cells.push((index, FREE_VIEW.to_owned(), fold(Shape::Curved, n, Photographer::Person)));
             }
         }
-        let rounds = (0..ROUNDS).flat_map(|round| cells.iter().map(move |cell| (round, cell)));
-        let groups = rounds.flat_map(|(round, (row, set, all))| by_scene(*row, set, share(all, round))).collect();
+        // What the report stands on first; then the beginning of everything, then its rest.
+        let (base, others): (Vec<_>, Vec<_>) = cells.iter().partition(|(row, set, _)| *row == 0 && set == CURVED);
+        let whole = base.iter().map(|cell| (cell, Part::All));
+        let parts = [Part::First, Part::Rest].into_iter().flat_map(|part| others.iter().map(move |cell| (cell, part)));
+        let groups = whole.chain(parts).flat_map(|((row, set, all), part)| by_scene(*row, set, part.of(all))).collect();
         Self { groups }
     }
 
@@ -118,9 +118,25 @@ impl Plan {
     }
 }
 
-/// A round's part of a list: every so many of it, so that each round has all levels.
-fn share(episodes: &[EpisodeRef], round: usize) -> Vec<EpisodeRef> {
-    episodes.iter().skip(round).step_by(ROUNDS).cloned().collect()
+/// Which episodes of a cell.
+#[derive(Copy, Clone)]
+enum Part {
+    All,
+    /// Every third.
+    First,
+    /// The others.
+    Rest,
+}
+
+impl Part {
+    fn of(self, episodes: &[EpisodeRef]) -> Vec<EpisodeRef> {
+        let is_in = |k: usize| match self {
+            Part::All => true,
+            Part::First => k.is_multiple_of(3),
+            Part::Rest => !k.is_multiple_of(3),
+        };
+        episodes.iter().enumerate().filter(|(k, _)| is_in(*k)).map(|(_, e)| e.clone()).collect()
+    }
 }
 
 fn by_scene(row: usize, set: &str, episodes: Vec<EpisodeRef>) -> Vec<Vec<Task>> {

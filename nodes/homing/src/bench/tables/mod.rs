@@ -2,8 +2,7 @@
 
 mod report;
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -204,7 +203,7 @@ fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
     let options = RunOptions {
         // Processes side by side would take each other's cores, and lockstep waits for the slowest.
         threads: if args.through_processes { 1 } else { args.threads },
-        commit: commit(),
+        commit: env!("HOMING_COMMIT").to_owned(),
         clips: (!args.no_clips).then(|| ClipFolder(args.out.join("clips"))),
     };
     let tally = Mutex::new((0_usize, 0_usize));
@@ -276,18 +275,4 @@ fn interruption() -> anyhow::Result<&'static AtomicBool> {
         }
     });
     Ok(&ASKED)
-}
-
-/// The sources' commit, `+` behind it where they were changed since.
-fn commit() -> String {
-    let sources = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let git = Command::new("git")
-        .arg("-C")
-        .arg(sources)
-        .args(["describe", "--always", "--dirty=+", "--abbrev=10", "--exclude", "*"])
-        .output();
-    match git {
-        Ok(said) if said.status.success() => String::from_utf8_lossy(&said.stdout).trim().to_owned(),
-        _ => "unknown".to_owned(),
-    }
 }
