@@ -274,8 +274,8 @@ impl GoalFilter {
     }
 
     /// Perception looked from `pose`, with nothing in between if `clear`, and did not agree with the best hypothesis. From a
-    /// view that is no worse than those that did agree, or all but the photo's own, this is held against it. `n_th` is the
-    /// switch's threshold, matches; the [ladder](LadderConfig) judges.
+    /// view that is no worse than those that did agree, or all but the photo's own, this is held against it, once for each
+    /// place unless the view is the photo's own. `n_th` is the switch's threshold, matches; the [ladder](LadderConfig) judges.
     pub fn doubt(&mut self, pose: &PlanarPose, clear: Sightline, n_th: f64, step: u64) -> Doubt {
         let config = self.config;
         let Some(best) = self.best_index(step) else { return Doubt::None };
@@ -287,9 +287,10 @@ impl GoalFilter {
         if alike {
             hypothesis.n_misses += 1;
         }
-        if alike || (no_worse && clear == Sightline::Clear) {
+        if alike || (no_worse && clear == Sightline::Clear && !hypothesis.was_looked_at_from(pose)) {
             hypothesis.support *= config.miss_factor;
             hypothesis.n_missed += 1;
+            hypothesis.missed_from = Some(*pose);
         }
         let climb = Climb {
             range_m,

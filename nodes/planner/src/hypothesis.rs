@@ -10,6 +10,8 @@ const NEW_VIEW_M: f64 = 0.05;
 const NEW_VIEW_RAD: f64 = 0.09;
 /// What a view that is not new counts for.
 const STALE_VIEW: f64 = 0.2;
+/// Misses from places nearer than this are one miss, metres.
+const SAME_PLACE_M: f64 = 0.2;
 /// Share of the old support that a new view replaces: what is seen now, from nearer, says more than what was seen often.
 const LEAK: f64 = 0.1;
 
@@ -61,6 +63,8 @@ pub struct Hypothesis {
     pub n_misses: u32,
     /// Views in a row that were no worse than those that showed it, and did not.
     pub n_missed: u32,
+    /// Where the robot was at the newest of these.
+    pub missed_from: Option<PlanarPose>,
     /// Not to be driven to before this step: no way led there.
     pub parked_until: u64,
 }
@@ -82,6 +86,7 @@ impl Hypothesis {
             seen_from: measurement.from,
             n_misses: 0,
             n_missed: 0,
+            missed_from: None,
             parked_until: 0,
         }
     }
@@ -117,7 +122,14 @@ impl Hypothesis {
         self.nearest_m = self.nearest_m.min(measurement.range_m);
         self.farthest_m = self.farthest_m.max(measurement.range_m);
         self.widest_rad = self.widest_rad.max(measurement.turn_rad);
-        (self.n_misses, self.n_missed) = (0, 0);
+        (self.n_misses, self.n_missed, self.missed_from) = (0, 0, None);
+    }
+
+    /// Whether `pose` is where the hypothesis was seen or missed last: turning there shows the same things again, and what was
+    /// not recognised once will not be, however often it is looked at.
+    pub fn was_looked_at_from(&self, pose: &PlanarPose) -> bool {
+        let from = self.missed_from.unwrap_or(self.seen_from);
+        from.distance_to(pose.x_m, pose.y_m) < SAME_PLACE_M
     }
 
     /// Fuses one scalar: `innovation` with variance `variance`, seen through the row `jacobian` over (x, y, yaw).

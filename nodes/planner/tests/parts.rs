@@ -183,6 +183,17 @@ fn a_place_that_lied_is_believed_again_only_on_much_better_evidence() {
 }
 
 #[test]
+fn turning_where_a_goal_was_seen_refutes_nothing_and_driving_on_without_it_does() {
+    let mut filter = GoalFilter::new(FilterConfig::default());
+    let place = PlanarPose { x_m: 2.4, y_m: 0.0, yaw_rad: 0.0 };
+    filter.join(&seen(&filter, LEVEL, place, 20), 1);
+    let mut doubt = |x_m| filter.doubt(&PlanarPose { x_m, ..LEVEL }, Sightline::Clear, 15.0, 1);
+    assert!((0..9).all(|_| doubt(0.0) == Doubt::None), "it was seen from there");
+    let driving_on: Vec<Doubt> = (1..=4).flat_map(|i| [0.3 * f64::from(i); 2]).map(&mut doubt).collect();
+    assert_eq!(driving_on.iter().position(|d| *d == Doubt::Refuted), Some(6), "four places, one miss each");
+}
+
+#[test]
 fn hypotheses_are_bounded() {
     let mut filter = GoalFilter::new(FilterConfig::default());
     for i in 0..40_i32 {

@@ -281,7 +281,7 @@ fn total(rows: &[Row]) {
     let steps: u64 = rows.iter().map(|r| r.watch.n_steps).sum();
     println!(
         "n {} success {:.3} SPL {:.4} soft {:.4} best {:.4} steps {:.0} turns {:.0} view_m {:.2} found_m {:.2} left_m {:.2} \
-         path_m {:.2} short_m {:.2} wrong {:.1} plan {:.1} ms",
+         path_m {:.2} short_m {:.2} wrong {:.1} collisions {:.2} plan {:.1} ms",
         rows.len(),
         mean(&|r| f64::from(u8::from(r.score.success))),
         mean(&|r| r.score.spl),
@@ -295,6 +295,7 @@ fn total(rows: &[Row]) {
         mean(&|r| r.score.path_length_m),
         mean(&|r| r.score.shortest_path_m),
         mean(&|r| r.watch.n_wrong as f64),
+        mean(&|r| r.score.collisions as f64),
         1e3 * rows.iter().map(|r| r.plan_s).sum::<f64>() / steps.max(1) as f64,
     );
 }
