@@ -6,8 +6,7 @@
 use std::time::Instant;
 
 use homing_sim::episode::FloorPose;
-use homing_sim::flat::mapped::{AGENT_HEIGHT_M, AGENT_RADIUS_M};
-use homing_sim::{Arena, BodySize, SceneRef, Viewpoint};
+use homing_sim::{Arena, SceneRef, Viewpoint};
 
 /// Views side by side.
 const COLUMNS: u32 = 4;
@@ -20,9 +19,9 @@ fn main() {
         eprintln!("layout_sheet MAP.png PREFIX");
         std::process::exit(2);
     };
-    let size = BodySize { radius_m: AGENT_RADIUS_M, height_m: AGENT_HEIGHT_M };
+    let scene = SceneRef::Layout { map: map.into() };
     let start = Instant::now();
-    let arena = Arena::load(&SceneRef::Layout { map: map.into() }, size).unwrap();
+    let arena = Arena::load(&scene, scene.body_size()).unwrap();
     let loaded = start.elapsed();
     let camera = Viewpoint { hfov_rad: 90_f64.to_radians(), ..Viewpoint::default() };
     let (w, h) = (camera.width, camera.height);

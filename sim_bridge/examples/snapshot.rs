@@ -35,7 +35,9 @@ fn main() {
 fn load(scene: &str) -> Scene {
     match scene.parse() {
         Ok(seed) => homing_sim::flat::generate(seed).scene,
-        Err(_) if scene.ends_with(".png") => mapped::build(&NavMap::read(Path::new(scene)).unwrap(), Detail::Full),
+        Err(_) if scene.ends_with(".png") => {
+            mapped::build(&NavMap::read(Path::new(scene)).unwrap(), Detail::Full).unwrap()
+        }
         Err(_) => homing_sim::gltf_scene::load(Path::new(scene)).unwrap(),
     }
 }

@@ -38,6 +38,26 @@ pub enum SceneRef {
     },
 }
 
+impl SceneRef {
+    /// The scene in a file: a map if it is a PNG, else glTF.
+    #[must_use]
+    pub fn of_file(path: PathBuf) -> Self {
+        match path.extension() {
+            Some(ending) if ending.eq_ignore_ascii_case("png") => Self::Layout { map: path },
+            _ => Self::Glb { path },
+        }
+    }
+
+    /// The body that the benchmark drives there: our robot, and on a map the agent that the map was made for.
+    #[must_use]
+    pub fn body_size(&self) -> BodySize {
+        match self {
+            Self::Layout { .. } => BodySize { radius_m: mapped::AGENT_RADIUS_M, height_m: mapped::AGENT_HEIGHT_M },
+            _ => BodySize::default(),
+        }
+    }
+}
+
 /// Size of a robot's body.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct BodySize {
@@ -103,7 +123,7 @@ impl Arena {
             SceneRef::Glb { path } => (gltf_scene::load(path)?, Vec::new()),
             SceneRef::Layout { map } => {
                 let map = NavMap::read(map)?;
-                let arena = Self::of_scene(scene_ref.clone(), mapped::build(&map, detail), Vec::new(), size)?;
+                let arena = Self::of_scene(scene_ref.clone(), mapped::build(&map, detail)?, Vec::new(), size)?;
                 return Ok(Self { floor_y_m: map.floor_y_m, ..arena });
             }
         };

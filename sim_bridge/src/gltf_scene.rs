@@ -1,6 +1,7 @@
 //! Any glTF 2.0 scene (.glb or .gltf) as a [`Scene`].
 //!
-//! glTF is y up, we are z up: (x, y, z) becomes (x, -z, y), so the floor stays at the height it was authored at. Light,
+//! glTF is y up, we are z up: (x, y, z) becomes (x, -z, y), so the floor stays at the height it was authored at. Scans that
+//! are z up against the standard say so in a file beside them: `up = "z"` in `NAME.toml`, and keep their axes. Light,
 //! cameras, animations and skins are not read: without lamps the renderer shows a scene in even, soft light.
 
 mod buffers;
@@ -8,6 +9,7 @@ mod images;
 mod materials;
 mod meshes;
 mod normals;
+mod up;
 
 use std::path::{Path, PathBuf};
 
@@ -32,6 +34,14 @@ pub enum SceneError {
         path: PathBuf,
         /// Why not.
         source: std::io::Error,
+    },
+    /// The file beside a scene does not say what it should.
+    #[error("{} does not describe a scene: {what}", path.display())]
+    Description {
+        /// The TOML file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
     },
     /// Neither a binary glTF nor a glTF in JSON, or a broken one.
     #[error("{name} is not a glTF 2.0 scene: {source}")]
@@ -100,7 +110,9 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let size = std::fs::metadata(path).map_err(|source| SceneError::Read { path: path.into(), source })?.len();
     check_size(&name, size)?;
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
-    parse(&name, &bytes, path.parent())
+    let mut scene = parse(&name, &bytes, path.parent())?;
+    up::Up::beside(path)?.apply(&mut scene);
+    Ok(scene)
 }
 
 /// Reads a scene from memory; it may not refer to other files. `name` is for reports.

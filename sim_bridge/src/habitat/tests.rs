@@ -94,7 +94,7 @@ fn our_episodes_survive_a_file() {
             |seed| EpisodeSpec { min_m: 1.5, shape: None, camera: free_viewpoint(seed), ..EpisodeSpec::default() };
         let mut episodes: Vec<_> = (0..6).map(|seed| episode::draw(arena, seed, &spec(seed)).unwrap()).collect();
         episodes[1].id = Some("X_12".into());
-        episodes[2].goal.yaw_rad = 3.141593;
+        episodes[2].goal.yaw_rad = (core::f64::consts::PI * 1e6).round() / 1e6;
         let (x_m, y_m) = (episodes[3].goal.x_m, episodes[3].goal.y_m);
         episodes[3].view_points = vec![(x_m, y_m)];
         episodes[3].success_m = 0.1;

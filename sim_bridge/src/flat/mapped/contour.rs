@@ -15,7 +15,23 @@ pub(super) fn outlines(floor: &Floor, tolerance_m: f64) -> Vec<Vec<Point>> {
     let metres =
         |(c, r): (i64, i64)| (g.origin_x_m + c as f64 * g.resolution_m, g.origin_y_m + r as f64 * g.resolution_m);
     let loops = trace(floor).into_iter().map(|corners| corners.into_iter().map(metres).collect::<Vec<Point>>());
-    loops.map(|corners| straightened(&corners, tolerance_m)).filter(|corners| corners.len() >= 3).collect()
+    let whole = |corners: Vec<Point>| {
+        let straight = straightened(&corners, tolerance_m);
+        if straight.len() >= 3 { straight } else { around(&corners) }
+    };
+    loops.map(whole).collect()
+}
+
+/// The rectangle around an outline, in its own direction: for what is too small to be straightened.
+fn around(corners: &[Point]) -> Vec<Point> {
+    let (low, high) = corners.iter().fold(((f64::MAX, f64::MAX), (f64::MIN, f64::MIN)), |(l, h), c| {
+        ((l.0.min(c.0), l.1.min(c.1)), (h.0.max(c.0), h.1.max(c.1)))
+    });
+    let mut rectangle = vec![low, (high.0, low.1), high, (low.0, high.1)];
+    if signed_area(corners) < 0.0 {
+        rectangle.reverse();
+    }
+    rectangle
 }
 
 /// Walks along all cell borders. Where two cells of floor touch at a corner, they hang together.
@@ -166,6 +182,13 @@ mod tests {
         let loops = outlines(&floor(&["####", "#.##", "##.#", "####"]), 0.1);
         assert_eq!(loops.len(), 1);
         assert!((signed_area(&loops[0]) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_smaller_than_the_tolerance_is_not_lost() {
+        let loops = outlines(&floor(&["#####", "#...#", "#.#.#", "#...#", "#####"]), 1.5);
+        let areas: Vec<f64> = loops.iter().map(|l| signed_area(l)).collect();
+        assert!(areas.contains(&-1.0), "{areas:?}");
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! What hangs on the walls of a mapped scene and stands flat against them. All of it is thin and in nobody's way: the map
 //! alone says where one can go.
 
+use core::cell::Cell;
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -27,6 +29,15 @@ pub(super) struct RoomLook {
     pub look: RoomStyle,
     /// A second wall surface.
     pub accent: Look,
+    /// Pictures hung so far: none comes twice before all were hung.
+    pub hung: Cell<usize>,
+}
+
+impl RoomLook {
+    fn next_picture(&self) -> &Look {
+        let posters = &self.style.posters;
+        &posters[self.hung.replace(self.hung.get() + 1) % posters.len()]
+    }
 }
 
 /// Draws one stretch of wall up to a height, metres, with what hangs on it.
@@ -146,11 +157,11 @@ fn put(pen: &mut Pen<'_>, item: Item, width: f64, room: &RoomLook, height_m: f64
         Item::Appliance => appliance(pen, width, rng.random_range(1.4..1.9), style, rng),
         Item::Picture => {
             let (middle, height) = (rng.random_range(1.35..1.65), width * rng.random_range(0.9..1.45));
-            picture(pen, (0.0, width), (middle - 0.5 * height, middle + 0.5 * height), room, rng);
+            picture(pen, (0.0, width), (middle - 0.5 * height, middle + 0.5 * height), room);
         }
         Item::Wide => {
             let (low, height) = (rng.random_range(0.85..1.2), width * rng.random_range(0.55..0.75));
-            picture(pen, (0.0, width), (low, low + height), room, rng);
+            picture(pen, (0.0, width), (low, low + height), room);
         }
         Item::Column => column(pen, width, room, rng),
         Item::Gallery => gallery(pen, width, room, rng),
@@ -169,8 +180,8 @@ fn put(pen: &mut Pen<'_>, item: Item, width: f64, room: &RoomLook, height_m: f64
     }
 }
 
-fn picture(pen: &mut Pen<'_>, x: (f64, f64), z: (f64, f64), room: &RoomLook, rng: &mut ChaCha8Rng) {
-    furniture::poster(pen, pick(&room.style.posters, rng), &room.look.wood, x, z);
+fn picture(pen: &mut Pen<'_>, x: (f64, f64), z: (f64, f64), room: &RoomLook) {
+    furniture::poster(pen, room.next_picture(), &room.look.wood, x, z);
 }
 
 /// Two or three pictures above each other.
@@ -180,7 +191,7 @@ fn column(pen: &mut Pen<'_>, width: f64, room: &RoomLook, rng: &mut ChaCha8Rng) 
     let low = 1.5 - 0.5 * each * f64::from(n);
     for k in 0..n {
         let z0 = low + each * f64::from(k);
-        picture(pen, (0.02, width - 0.02), (z0 + 0.04, z0 + each - 0.03), room, rng);
+        picture(pen, (0.02, width - 0.02), (z0 + 0.04, z0 + each - 0.03), room);
     }
 }
 
@@ -190,7 +201,7 @@ fn gallery(pen: &mut Pen<'_>, width: f64, room: &RoomLook, rng: &mut ChaCha8Rng)
     for k in 0..6_u32 {
         let (x, z) = (each * f64::from(k % 3), 1.05 + 0.45 * f64::from(k / 3));
         let (dx, dz) = (rng.random_range(0.03..0.07), rng.random_range(0.0..0.08));
-        picture(pen, (x + dx, x + each - 0.04), (z + dz, z + 0.4), room, rng);
+        picture(pen, (x + dx, x + each - 0.04), (z + dz, z + 0.4), room);
     }
 }
 

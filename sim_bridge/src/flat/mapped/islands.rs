@@ -19,7 +19,7 @@ const FURNITURE_M_MAX: f64 = 3.5;
 const WALL_THIN_M: f64 = 0.18;
 const WALL_LONG_M: f64 = 1.2;
 /// What is smaller than this is a post, square metres.
-const POST_M2_MAX: f64 = 0.012;
+pub(super) const POST_M2_MAX: f64 = 0.012;
 /// Half the side of a post, metres: what widening the floor left of it may be less than a chair's leg.
 const POST_HALF_M: f64 = 0.035;
 

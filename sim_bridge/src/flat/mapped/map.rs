@@ -73,6 +73,16 @@ pub enum MapError {
         /// Its longer side, metres.
         span_m: f64,
     },
+    /// Specks all over.
+    #[error("the map {name} has {found} separate outlines, at most {allowed} are built: it is noise, not rooms")]
+    Ragged {
+        /// The map's name.
+        name: String,
+        /// Outlines found.
+        found: usize,
+        /// Outlines allowed.
+        allowed: usize,
+    },
     /// The file beside the map does not say what it should.
     #[error("{} does not describe a map: {what}", path.display())]
     Description {

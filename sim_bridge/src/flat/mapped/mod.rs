@@ -12,6 +12,8 @@ mod regions;
 mod stretches;
 mod widen;
 
+use core::cell::Cell;
+
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -40,17 +42,23 @@ const STRAIGHTENED_M: f64 = 0.08;
 /// Rooms with a stock of looks of their own; further rooms share them.
 const STYLES_MAX: usize = 8;
 /// Pictures in a room's stock.
-const POSTERS: usize = 8;
+const POSTERS: usize = 14;
 /// Share of rooms whose walls may be plain plaster.
-const PLAIN_SHARE: f64 = 0.3;
+const PLAIN_SHARE: f64 = 0.2;
 /// Floor for which one lamp is enough, square metres.
 const LAMP_M2: f64 = 11.0;
+/// A map with more outlines than this is noise, not rooms: every one would become a wall or a piece of furniture.
+const OUTLINES_MAX: usize = 3000;
+/// Single closed pixels stand in nobody's way: a post this near to where an agent's centre can be would. Metres.
+const POST_CLEAR_M: f64 = AGENT_RADIUS_M + 0.075;
 /// Pieces of floor overlap by this, metres, so that no crack shows between them.
 const OVERLAP_M: f64 = 0.002;
 
 /// Builds the scene of a map. The floor is at z = 0; x and y are Habitat's x and -z (see [`crate::habitat::axes`]).
-#[must_use]
-pub fn build(map: &NavMap, detail: Detail) -> Scene {
+///
+/// # Errors
+/// [`MapError::Ragged`] for a map of specks.
+pub fn build(map: &NavMap, detail: Detail) -> Result<Scene, MapError> {
     let rng = &mut ChaCha8Rng::seed_from_u64(map.seed());
     let height_m = rng.random_range(2.5..2.7);
     let regions = Regions::of(map);
@@ -60,8 +68,16 @@ pub fn build(map: &NavMap, detail: Detail) -> Scene {
     let look_of = |room: u32| &looks[room as usize % looks.len()];
     let scene = &mut SceneBuilder::default();
     floors(scene, &regions, &looks, height_m);
-    for corners in contour::outlines(&floor, STRAIGHTENED_M) {
-        if contour::signed_area(&corners) < 0.0 && islands::is_furniture(&corners) {
+    let outlines = contour::outlines(&floor, STRAIGHTENED_M);
+    if outlines.len() > OUTLINES_MAX {
+        return Err(MapError::Ragged { name: map.name.clone(), found: outlines.len(), allowed: OUTLINES_MAX });
+    }
+    for corners in outlines {
+        let area = contour::signed_area(&corners);
+        if area.abs() < islands::POST_M2_MAX && (area > 0.0 || regions.is_navigable_near(corners[0], POST_CLEAR_M)) {
+            continue;
+        }
+        if area < 0.0 && islands::is_furniture(&corners) {
             islands::block(scene, &corners, look_of(room_around(&corners, &regions)), rng);
             continue;
         }
@@ -72,7 +88,7 @@ pub fn build(map: &NavMap, detail: Detail) -> Scene {
     for room in 0..regions.rooms.len() as u32 {
         lamps_and_rug(scene, &regions, room, look_of(room), height_m, rng);
     }
-    core::mem::take(scene).finish(format!("layout {}", map.name), detail, &mut Stock::new())
+    Ok(core::mem::take(scene).finish(format!("layout {}", map.name), detail, &mut Stock::new()))
 }
 
 /// Looks of one room, from a stock of its own.
@@ -88,7 +104,7 @@ fn room_look(rng: &mut ChaCha8Rng) -> RoomLook {
     }
     let other = style.room(*pick(&[Living, Study], rng), rng).wall;
     let accent = if other == look.wall { Look::of(Surface::Wallpaper, rng.next_u64()) } else { other };
-    RoomLook { style, look, accent }
+    RoomLook { style, look, accent, hung: Cell::new(0) }
 }
 
 fn room_around(corners: &[Point], regions: &Regions) -> u32 {

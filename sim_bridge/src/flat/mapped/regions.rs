@@ -1,5 +1,7 @@
 //! Rooms of a map: where the floor is wide, divided where it is narrow.
 
+use std::collections::VecDeque;
+
 use homing_core::GridGeometry;
 
 use super::contour::Point;
@@ -9,6 +11,8 @@ use super::map::NavMap;
 const NECK_SHARE: f64 = 0.62;
 /// A room smaller than this belongs to its neighbour, square metres.
 const ROOM_M2_MIN: f64 = 2.5;
+/// A room in which the way from one end to the other is longer than this is divided, metres: long corridors, halls.
+const LONG_M: f64 = 9.0;
 /// Floors and looks reach this far beyond the map, metres: under the walls.
 pub(super) const BEYOND_M: f64 = 0.42;
 
@@ -59,6 +63,7 @@ impl Regions {
         let basins = basins(&clearance_m, &geometry);
         let mut regions = Self { geometry, of_cell: basins, clearance_m, rooms: Vec::new() };
         regions.number();
+        regions.divide_long_ones();
         regions.spread(m);
         regions
     }
@@ -72,6 +77,18 @@ impl Regions {
     /// Distance from a point to what is not navigable, metres; 0 there.
     pub fn clearance_m(&self, p: Point) -> f64 {
         self.geometry.cell_at(p.0, p.1).map_or(0.0, |(c, r)| self.clearance_m[self.geometry.index(c, r)])
+    }
+
+    /// True if a navigable cell's centre lies within `radius_m` metres of a point.
+    pub fn is_navigable_near(&self, p: Point, radius_m: f64) -> bool {
+        let g = &self.geometry;
+        let Some((column, row)) = g.cell_at(p.0, p.1) else { return false };
+        let reach = (radius_m / g.resolution_m).ceil() as usize;
+        let columns = column.saturating_sub(reach)..(column + reach + 1).min(g.width);
+        let rows = row.saturating_sub(reach)..(row + reach + 1).min(g.height);
+        rows.flat_map(|r| columns.clone().map(move |c| (c, r))).any(|(c, r)| {
+            self.clearance_m[g.index(c, r)] > 0.0 && super::contour::distance(g.centre(c, r), p) < radius_m
+        })
     }
 
     /// Up to `n` places of a room far from each other and at least `clear_m` from what is not navigable, the room's
@@ -89,6 +106,46 @@ impl Regions {
             chosen.push(next);
         }
         chosen
+    }
+
+    /// Halves every room that is long, between the two places in it that are farthest apart, until none is.
+    fn divide_long_ones(&mut self) {
+        let long = (LONG_M / self.geometry.resolution_m) as u32;
+        let mut seeds: Vec<usize> = Vec::new();
+        for (room, region) in (0_u32..).zip(&self.rooms) {
+            let middle = self.geometry.cell_at(region.middle.0, region.middle.1);
+            seeds.extend(middle.map(|(c, r)| self.geometry.index(c, r)).filter(|i| self.of_cell[*i] == Some(room)));
+        }
+        let mut rooms = seeds.len() as u32;
+        while let Some(seed) = seeds.pop() {
+            let Some((one, _)) = farthest(&self.steps_within(seed)) else { continue };
+            let from_one = self.steps_within(one);
+            let Some((other, _)) = farthest(&from_one).filter(|(_, steps)| *steps > long) else { continue };
+            let from_other = self.steps_within(other);
+            let nearer = (0..from_one.len()).filter(|i| from_other[*i] < from_one[*i]);
+            nearer.for_each(|i| self.of_cell[i] = Some(rooms));
+            rooms += 1;
+            seeds.extend([one, other]);
+        }
+        self.rooms.clear();
+        self.number();
+    }
+
+    /// Steps from a cell to all others of its room; `u32::MAX` where there is no way within it.
+    fn steps_within(&self, from: usize) -> Vec<u32> {
+        let room = self.of_cell[from];
+        let mut steps = vec![u32::MAX; self.of_cell.len()];
+        let mut queue = VecDeque::from([from]);
+        steps[from] = 0;
+        while let Some(at) = queue.pop_front() {
+            for next in neighbours(at, &self.geometry) {
+                if steps[next] == u32::MAX && self.of_cell[next] == room {
+                    steps[next] = steps[at] + 1;
+                    queue.push_back(next);
+                }
+            }
+        }
+        steps
     }
 
     /// Numbers the rooms from 0 and measures them.
@@ -122,6 +179,11 @@ impl Regions {
             }
         }
     }
+}
+
+/// The cell most steps away, and how many.
+fn farthest(steps: &[u32]) -> Option<(usize, u32)> {
+    steps.iter().copied().enumerate().filter(|(_, s)| *s < u32::MAX).max_by_key(|(_, s)| *s)
 }
 
 fn neighbours(index: usize, g: &GridGeometry) -> impl Iterator<Item = usize> {
@@ -210,6 +272,14 @@ mod tests {
         assert!((area - 61.0 * 0.25).abs() < 1e-9);
         let wide = ["......#......", ".............", ".............", ".............", "......#......"];
         assert_eq!(Regions::of(&map(&wide, 0.5)).rooms.len(), 1);
+    }
+
+    #[test]
+    fn a_long_corridor_is_more_than_one_room() {
+        let rooms = Regions::of(&map(&["........................................"; 3], 0.5)).rooms;
+        assert!((3..=6).contains(&rooms.len()), "20 m: {} rooms", rooms.len());
+        let area: f64 = rooms.iter().map(|r| r.area_m2).sum();
+        assert!((area - 30.0).abs() < 1e-9 && rooms.iter().all(|r| r.area_m2 > 2.0), "{rooms:?}");
     }
 
     #[test]

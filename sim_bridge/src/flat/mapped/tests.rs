@@ -63,7 +63,7 @@ fn what_the_map_calls_navigable_is_free_and_what_it_closes_is_not() {
 fn equal_maps_give_equal_scenes_and_others_other_ones() {
     let read = |name: &str, image: &image::GrayImage| NavMap::read(&written(name, image, SCALE)).unwrap();
     let (a, again) = (read("equal", &drawn()), read("again", &drawn()));
-    assert_eq!(build(&a, Detail::Full), build(&again, Detail::Full));
+    assert_eq!(build(&a, Detail::Full).unwrap(), build(&again, Detail::Full).unwrap());
     let mut other = drawn();
     other.put_pixel(10, 10, image::Luma([0]));
     assert_ne!(a.seed(), read("other", &other).seed());
@@ -71,7 +71,7 @@ fn equal_maps_give_equal_scenes_and_others_other_ones() {
 
 #[test]
 fn a_mapped_scene_is_varied_and_of_sensible_size() {
-    let scene = build(&NavMap::read(&written("varied", &drawn(), SCALE)).unwrap(), Detail::Full);
+    let scene = build(&NavMap::read(&written("varied", &drawn(), SCALE)).unwrap(), Detail::Full).unwrap();
     let n: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
     assert!((1_000..60_000).contains(&n), "{n} triangles");
     assert!(scene.textures.len() >= 15, "{} textures", scene.textures.len());
@@ -85,7 +85,7 @@ fn a_mapped_scene_is_varied_and_of_sensible_size() {
 #[test]
 fn what_is_no_map_is_refused_with_the_reason() {
     let refused = |path: &PathBuf| {
-        let error = Arena::load_as(&SceneRef::Layout { map: path.clone() }, AGENT, Detail::Shape).unwrap_err();
+        let error = Arena::load_as(&SceneRef::Layout { map: path.clone() }, AGENT, Detail::Shape).err().unwrap();
         assert!(matches!(error, ArenaError::Map(_)), "{error}");
         let text = error.to_string();
         assert!(text.contains(&path.file_stem().unwrap().to_string_lossy().into_owned()), "{text}");
@@ -101,6 +101,8 @@ fn what_is_no_map_is_refused_with_the_reason() {
     let picture = folder("rgb").join("Picture.png");
     image::RgbImage::new(20, 20).save(&picture).unwrap();
     assert!(refused(&picture).contains("8-bit grey"));
+    let specks = image::GrayImage::from_fn(300, 300, |x, y| image::Luma([u8::from(x % 4 > 0 || y % 4 > 0)]));
+    assert!(refused(&written("specks", &specks, SCALE)).contains("separate outlines"));
     let text = folder("text").join("Text.png");
     std::fs::write(&text, "no image").unwrap();
     assert!(refused(&text).contains("not an image"));
