@@ -13,6 +13,7 @@ from .features import write as write_features
 from .geometry import View, Warp, transform_points
 from .matcher import Assignment, Matcher, log_probability, mutual_matches
 from .matcher_loss import UNMATCHED, match_labels
+from .switch import ExportedSwitch, SwitchMlp, global_descriptor
 from .synthetic import write_set
 from .train_extractor import add_extractor_options
 from .train_extractor import plan_from as extractor_plan
@@ -38,6 +39,7 @@ def main() -> None:
             check_fast_matcher_is_the_first_layers,
             check_heat_map_finds_blobs,
             check_labels_are_mutual,
+            check_global_descriptor_by_hand,
         ):
             check()
             print(f"ok  {check.__name__}")
@@ -170,6 +172,21 @@ def check_labels_are_mutual() -> None:
     points_b = np.array([[220.0, 150], [120, 50], [170, 100]])
     labels_a, labels_b = match_labels(warp, points_a, points_b)
     assert list(labels_a) == [1, 2, 0, UNMATCHED] and list(labels_b) == [2, 0, 1]
+
+
+def check_global_descriptor_by_hand() -> None:
+    """Two keypoints, left and right, the second three times as strong."""
+    descriptors = torch.zeros(2, 64)
+    descriptors[0, 0], descriptors[1, 0], descriptors[1, 5] = 1.0, 0.6, 0.8
+    points, scores = torch.tensor([[-0.9, 0.0], [0.9, 0.0]]), torch.tensor([1.0, 3.0])
+    mean, deviation, most, left, middle, right = global_descriptor(points, descriptors, scores).view(6, 64)
+    assert torch.allclose(mean[[0, 5, 9]], torch.tensor([0.7, 0.6, 0.0])) and torch.equal(most[[0, 5]], torch.tensor([1.0, 0.8]))
+    # Weights 1/4 and 3/4: the variance of 1 and 0.6 is 0.03, of 0 and 0.8 it is 0.12.
+    assert torch.allclose(deviation[[0, 5]].square(), torch.tensor([0.03, 0.12]), atol=1e-6)
+    assert torch.allclose(left, descriptors[0], atol=1e-5) and torch.allclose(right, descriptors[1], atol=1e-5)
+    assert float(middle.abs().max()) == 0.0
+    images = [points, descriptors, scores] * 2
+    assert ExportedSwitch(SwitchMlp().eval())(*images).shape == (1,)
 
 
 def check_resume_gives_the_same_next_step(folder: Path) -> None:

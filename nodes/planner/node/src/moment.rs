@@ -1,6 +1,6 @@
 //! Collects what belongs to one moment: depth, intrinsics and odometry of one stamp, and perception's answer to it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use homing_core::{
@@ -12,6 +12,8 @@ use homing_planner::PlannerObservation;
 const WAITING_MAX: usize = 16;
 /// Odometry kept: five seconds at 50 Hz.
 const ODOMETRY_MAX: usize = 256;
+/// Answers remembered as taken.
+const TAKEN_MAX: usize = 64;
 
 /// What has arrived and was not yet used.
 #[derive(Default)]
@@ -19,6 +21,8 @@ pub struct Moments {
     waiting: BTreeMap<Stamp, Parts>,
     mount: Option<Transform<Base, Camera>>,
     estimates: BTreeMap<Stamp, GoalEstimate>,
+    /// Stamps whose answers were taken: a frame sent again on a busy machine is answered again, and counts once.
+    taken: BTreeSet<Stamp>,
     // More frequent than images: kept apart, so that it does not push them out.
     odometry: BTreeMap<Stamp, Odometry>,
     clock: Stamp,
@@ -58,10 +62,10 @@ impl Moments {
     }
 
     /// Keeps an estimate that speaks of `goal_id`, and says whether it does. "No goal yet" is no answer: the photo is still
-    /// on its way.
+    /// on its way; nor is what was answered before.
     pub fn estimate(&mut self, estimate: GoalEstimate, goal_id: u64) -> bool {
         let no_goal = matches!(estimate.sighting, Sighting::NotSeen { reason: UnseenReason::NoGoal });
-        if no_goal || estimate.goal_id != goal_id {
+        if no_goal || estimate.goal_id != goal_id || self.taken.contains(&estimate.stamp) {
             return false;
         }
         self.estimates.insert(estimate.stamp, estimate);
@@ -102,13 +106,19 @@ impl Moments {
     pub fn close(&mut self, stamp: Stamp) -> Vec<GoalEstimate> {
         let later = self.estimates.split_off(&Stamp(stamp.0.saturating_add(1)));
         self.waiting.retain(|at, _| *at > stamp);
-        std::mem::replace(&mut self.estimates, later).into_values().collect()
+        let answers = std::mem::replace(&mut self.estimates, later);
+        self.taken.extend(answers.keys());
+        while self.taken.len() > TAKEN_MAX {
+            self.taken.pop_first();
+        }
+        answers.into_values().collect()
     }
 
     /// Forgets all moments: the robot's clock began anew, or the goal changed.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.estimates.clear();
+        self.taken.clear();
         self.odometry.clear();
     }
 
@@ -117,5 +127,37 @@ impl Moments {
             self.waiting.pop_first();
         }
         self.waiting.entry(stamp).or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use homing_core::StageTimes;
+
+    use super::*;
+
+    fn answer(stamp: u64, goal_id: u64) -> GoalEstimate {
+        GoalEstimate {
+            stamp: Stamp(stamp),
+            goal_id,
+            sighting: Sighting::NotSeen { reason: UnseenReason::NoConsensus },
+            switch_probability: None,
+            n_matches: 0,
+            matched_points: Vec::new(),
+            times: StageTimes::default(),
+        }
+    }
+
+    #[test]
+    fn an_answer_that_comes_twice_counts_once() {
+        let mut moments = Moments::default();
+        assert!(moments.estimate(answer(5, 1), 1) && moments.estimate(answer(5, 1), 1));
+        assert_eq!(moments.close(Stamp(5)), [answer(5, 1)]);
+        assert!(!moments.estimate(answer(5, 1), 1), "it was taken");
+        // What memory says of an image from before is new.
+        assert!(moments.estimate(answer(3, 1), 1) && moments.estimate(answer(6, 1), 1));
+        assert_eq!(moments.close(Stamp(6)), [answer(3, 1), answer(6, 1)]);
+        moments.clear();
+        assert!(moments.estimate(answer(5, 2), 2), "of another goal it says something else");
     }
 }

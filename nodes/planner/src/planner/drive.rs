@@ -84,7 +84,8 @@ impl Planner {
         }
     }
 
-    /// The goal stays believed, but cannot be reached: search on, and try again later.
+    /// The goal stays believed, but cannot be reached: search on, and try again later. Without recovery
+    /// this is the end.
     fn give_up_for_now(&mut self, why: &str) -> Decision {
         if !self.may_turn_back() {
             if self.mapper.forget_bumps() > 0 {
