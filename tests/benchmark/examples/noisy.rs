@@ -1,11 +1,11 @@
 //! `noisy FIRST_SEED N [NOISE ..]`: N episodes of the benchmark under each kind of noise, and how far the odometry is off at
-//! their ends.
+//! their ends, and how often the robot turned to each side.
 
 use std::sync::Arc;
 
 use homing_benchmark::Policy;
 use homing_benchmark::episode::run_episode_as;
-use homing_core::{PlanarPose, Transform, wrap_angle};
+use homing_core::{Action, PlanarPose, Transform, wrap_angle};
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::{AnyEstimator, PerceptionConfig};
 use homing_planner::PlannerConfig;
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let episode = episode::draw(&arena, seed, &EpisodeSpec::default())?;
         for preset in &presets {
             let robot = SimConfig { noise: preset.config(), ..SimConfig::default() };
-            let (mut start, mut off, mut jumps) = (None, (0.0, 0.0), 0);
+            let (mut start, mut off, mut jumps, mut turns) = (None, (0.0, 0.0), 0, (0, 0));
             let (config, discovery) = (PlannerConfig::default(), Policy::default().build());
             let run = run_episode_as(robot, &arena, &episode, &mut estimator, config, discovery, &mut |step| {
                 let start = *start.get_or_insert(step.pose_truth);
@@ -34,6 +34,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let believed = step.observation.odometry.t_odom_base.planar();
                 let turned_rad = wrap_angle(believed.yaw_rad - truth.yaw_rad);
                 off = (believed.distance_to(truth.x_m, truth.y_m), turned_rad.to_degrees());
+                turns.0 += u32::from(step.action == Action::TurnLeft);
+                turns.1 += u32::from(step.action == Action::TurnRight);
                 if step.state.reason.contains("jumped") {
                     jumps += 1;
                     println!("    {} jumps at {believed:?}", step.state.stamp.seconds());
@@ -41,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             })?;
             println!(
                 "flat {seed} {:15} {} after {:3} steps, {:.2} m from the goal, {:2} collisions; odometry off by {:.2} m \
-                 and {:.1} degrees, {jumps} jumps; {:?}: {}",
+                 and {:.1} degrees after {turns:?} turns, {jumps} jumps; {:?}: {}",
                 preset.name(),
                 if run.score.success { "success" } else { "failure" },
                 run.score.steps,
