@@ -23,6 +23,7 @@ mod planner;
 mod progress;
 mod projection;
 mod route;
+mod steering;
 mod switches;
 mod terrain;
 pub mod visual_target;

@@ -18,6 +18,7 @@ use crate::local::LocalPlanner;
 use crate::mapper::{Integrated, Mapper};
 use crate::progress::Progress;
 use crate::route::RoutePlanner;
+use crate::steering::Steering;
 use crate::switches::{Look, Outlook, SwitchKind, Verdict};
 use crate::terrain::Terrain;
 
@@ -68,6 +69,7 @@ pub struct Planner {
     hinted_at: Vec<u64>,
     arrival: Arrival,
     progress: Progress,
+    steering: Steering,
     /// What the estimate of this step said, for the switches that fuse nothing.
     look: Option<Look>,
     goal_id: Option<u64>,
@@ -101,6 +103,7 @@ impl Planner {
             hinted_at: Vec::new(),
             arrival: Arrival::default(),
             progress: Progress::default(),
+            steering: Steering::default(),
             look: None,
             goal_id: None,
             last_goal_id: None,

@@ -1,4 +1,4 @@
-//! `inspect SEED FOLDER [straight]`: one episode in detail: a line for every step, and a plan of it seen from above.
+//! `inspect EPISODE FOLDER [straight]`: one episode, by seed or by name as `train-easy-57`, in detail: a line for every step, and a plan of it seen from above.
 //!
 //! Plan: what is known white, obstacles black, never seen grey (the planner's map over the true floor plan), the way in
 //! blue while exploring and orange while driving to the goal, the true goal a green arrow, right sightings green dots, wrong
@@ -9,15 +9,35 @@ use std::path::Path;
 use std::sync::Arc;
 
 use homing_benchmark::cause::{is_in_view, right_pose, sighted_pose};
+use homing_benchmark::suite::sets::{self, Photographer};
 use homing_benchmark::{Policy, StepRecord, Trial, run_episode};
 use homing_core::{Cell, Mode, OccupancyGrid, PlanarPose, Sighting};
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::{AnyEstimator, PerceptionConfig, SiftConfig};
 use homing_sim::arena::{Arena, BodySize, SceneRef};
-use homing_sim::episode::{self, Episode, EpisodeSpec};
+use homing_sim::episode::{self, Episode, EpisodeSpec, Level, Shape};
+use homing_sim::folds::{Fold, Split};
 use image::{Rgb, RgbImage};
 
 const SCALE: f64 = 80.0;
+
+/// The benchmark's episode of a seed, or one of the suite's curved folds by its name: `easy-57`, on training flats `train-easy-57`.
+fn task(name: &str) -> Result<(Arc<Arena>, Episode), Box<dyn std::error::Error>> {
+    if let Ok(seed) = name.parse() {
+        let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
+        let episode = episode::draw(&arena, seed, &EpisodeSpec::default())?;
+        return Ok((arena, episode));
+    }
+    let (split, id) = name.strip_prefix("train-").map_or((Split::Test, name), |id| (Split::Train, id));
+    let (level, number) = id.rsplit_once('-').ok_or("neither a seed nor an episode such as easy-57")?;
+    let level = Level::ALL.into_iter().find(|l| l.name() == level).ok_or("no such level")?;
+    let fold = Fold { split, shape: Shape::Curved, level };
+    let all = sets::flats(fold, number.parse::<usize>()? + 1, Photographer::Robot);
+    let wanted = all.last().ok_or("no episode")?;
+    let arena = Arc::new(Arena::load(&wanted.scene, wanted.body)?);
+    let episode = wanted.episode(&arena)?;
+    Ok((arena, episode))
+}
 
 struct Mark {
     pose: PlanarPose,
@@ -30,11 +50,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [seed, folder, flags @ ..] = arguments.as_slice() else {
         return Err("inspect SEED FOLDER [straight] [wrong]".into());
     };
-    let (seed, folder) = (seed.parse()?, Path::new(folder));
+    let folder = Path::new(folder);
     let has = |flag: &str| flags.iter().any(|f| f == flag);
     std::fs::create_dir_all(folder)?;
-    let arena = Arc::new(Arena::load(&SceneRef::Flat { seed }, BodySize::default())?);
-    let episode = episode::draw(&arena, seed, &EpisodeSpec::default())?;
+    let (arena, episode) = task(seed)?;
     let photo = episode.camera.photo(&arena, episode.goal)?;
     save(&photo, &folder.join("goal.png"))?;
     let policy = if has("straight") { Policy::Straight } else { Policy::Frontier };

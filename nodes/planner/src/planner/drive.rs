@@ -8,6 +8,7 @@ use crate::event::{Perception, StepEvent};
 use crate::fmm::Until;
 use crate::local::LocalChoice;
 use crate::route::Route;
+use crate::steering::Ahead;
 use crate::terrain::Window;
 
 /// Steps of an approach without coming closer before something else is tried.
@@ -167,7 +168,9 @@ impl Planner {
             self.progress.begin_escape(&self.config.body);
             return Decision::new(self.progress.escape(), format!("{why}: no heading is clear, turning away"));
         }
-        Decision::new(action(choice), why)
+        let ahead = self.local.is_clear(&pose, pose.yaw_rad, &self.terrain);
+        let ahead = if ahead { Ahead::Clear } else { Ahead::Blocked };
+        Decision::new(action(self.steering.settle(self.state.step, choice, ahead)), why)
     }
 
     fn march_travel(&mut self) {

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use homing_sim::arena::SceneRef;
 use homing_sim::episode::{Level, Shape};
+use homing_sim::folds::{Fold, Split};
 
 use super::rows::{Headline, Row};
 use super::sets::{self, EpisodeRef, Photographer};
@@ -45,34 +46,40 @@ pub struct Plan {
     pub groups: Vec<Vec<Task>>,
 }
 
-/// Generated flats with NRNS's straight episodes.
-pub const STRAIGHT: &str = "flats-straight";
-/// Generated flats, curved episodes, photos taken by people.
-pub const FREE_VIEW: &str = "flats-free-view";
+/// The sets on generated flats: NRNS's curved and straight episodes, and curved ones with photos taken by people.
+fn set_names(split: Split) -> [&'static str; 3] {
+    match split {
+        Split::Test => [CURVED, "flats-straight", "flats-free-view"],
+        Split::Train => ["train-curved", "train-straight", "train-free-view"],
+    }
+}
+
 impl Plan {
     /// For every row the curved folds on flats; for the first row besides them the straight folds, photos taken by people, and
     /// the sets of `more`.
     #[must_use]
-    pub fn new(rows: &[Row], amounts: Amounts, more: &[(String, Vec<EpisodeRef>)]) -> Self {
+    pub fn new(rows: &[Row], amounts: Amounts, split: Split, more: &[(String, Vec<EpisodeRef>)]) -> Self {
         let fold = |shape, n, photographer| -> Vec<EpisodeRef> {
-            Level::ALL[..3].iter().flat_map(|level| sets::flats(shape, *level, n, photographer)).collect()
+            let of = |level: &Level| sets::flats(Fold { split, shape, level: *level }, n, photographer);
+            Level::ALL[..3].iter().flat_map(of).collect()
         };
+        let [curved, straight, free_view] = set_names(split);
         let mut cells: Vec<(usize, String, Vec<EpisodeRef>)> = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             let n = match row.headline {
                 Headline::Yes => amounts.headline,
                 Headline::No => amounts.others,
             };
-            cells.push((index, CURVED.to_owned(), fold(Shape::Curved, n, Photographer::Robot)));
+            cells.push((index, curved.to_owned(), fold(Shape::Curved, n, Photographer::Robot)));
             if index == 0 {
                 cells.extend(more.iter().map(|(set, episodes)| (index, set.clone(), episodes.clone())));
                 let n = amounts.others;
-                cells.push((index, STRAIGHT.to_owned(), fold(Shape::Straight, n, Photographer::Robot)));
-                cells.push((index, FREE_VIEW.to_owned(), fold(Shape::Curved, n, Photographer::Person)));
+                cells.push((index, straight.to_owned(), fold(Shape::Straight, n, Photographer::Robot)));
+                cells.push((index, free_view.to_owned(), fold(Shape::Curved, n, Photographer::Person)));
             }
         }
         // What the report stands on first; then the beginning of everything, then its rest.
-        let (base, others): (Vec<_>, Vec<_>) = cells.iter().partition(|(row, set, _)| *row == 0 && set == CURVED);
+        let (base, others): (Vec<_>, Vec<_>) = cells.iter().partition(|(row, set, _)| *row == 0 && set == curved);
         let whole = base.iter().map(|cell| (cell, Part::All));
         let parts = [Part::First, Part::Rest].into_iter().flat_map(|part| others.iter().map(move |cell| (cell, part)));
         let groups = whole.chain(parts).flat_map(|((row, set, all), part)| by_scene(*row, set, part.of(all))).collect();
@@ -165,7 +172,7 @@ mod tests {
     fn plan(amounts: Amounts) -> (Vec<Row>, Plan) {
         let models = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../nodes/perception/models"));
         let rows = rows(&FeatureChoice::default(), models).unwrap();
-        let plan = Plan::new(&rows, amounts, &[]);
+        let plan = Plan::new(&rows, amounts, Split::Test, &[]);
         (rows, plan)
     }
 
@@ -179,7 +186,7 @@ mod tests {
         };
         assert_eq!(of("frontier", "flats-curved", Level::Hard), 9);
         assert_eq!(of("frontier", "flats-straight", Level::Easy), 5);
-        assert_eq!(of("frontier", FREE_VIEW, Level::Easy), 5);
+        assert_eq!(of("frontier", "flats-free-view", Level::Easy), 5);
         assert_eq!(of("straight", "flats-curved", Level::Medium), 5);
         assert_eq!(of("straight", "flats-straight", Level::Medium), 0);
         let mut names: Vec<String> = tasks.iter().map(|t| format!("{} {} {}", t.row, t.set, t.episode.id)).collect();

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use homing_sim::arena::{Arena, BodySize, SceneRef};
-use homing_sim::episode::{Episode, Level, Shape, Viewpoint};
+use homing_sim::episode::{Episode, Level, Viewpoint};
 use homing_sim::flat::Detail;
 use homing_sim::flat::mapped::{AGENT_HEIGHT_M, AGENT_RADIUS_M};
-use homing_sim::folds::{Fold, Split, Task as FoldTask, free_viewpoint};
+use homing_sim::folds::{Fold, Task as FoldTask, free_viewpoint};
 use homing_sim::habitat::{EpisodeFile, HabitatError, find_scene, place};
 use thiserror::Error;
 
@@ -69,10 +69,10 @@ pub enum Photographer {
     Person,
 }
 
-/// The first `n` episodes of a fold on the test flats, in turn from each.
+/// The first `n` episodes of a fold, in turn from each of its flats.
 #[must_use]
-pub fn flats(shape: Shape, level: Level, n: usize, photographer: Photographer) -> Vec<EpisodeRef> {
-    let fold = Fold { split: Split::Test, shape, level };
+pub fn flats(fold: Fold, n: usize, photographer: Photographer) -> Vec<EpisodeRef> {
+    let level = fold.level;
     let episode = |(k, task): (usize, FoldTask)| EpisodeRef {
         scene: SceneRef::Flat { seed: task.flat },
         body: BodySize::default(),
@@ -199,6 +199,9 @@ pub fn thinned(episodes: &[EpisodeRef], n: usize) -> Vec<EpisodeRef> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may fail by panicking")]
 mod tests {
+    use homing_sim::episode::Shape;
+    use homing_sim::folds::Split;
+
     use super::*;
 
     #[test]
@@ -220,10 +223,14 @@ mod tests {
         assert!(refused.contains("a.json"), "{refused}");
     }
 
+    fn curved(level: Level) -> Fold {
+        Fold { split: Split::Test, shape: Shape::Curved, level }
+    }
+
     #[test]
     fn thinning_takes_evenly_from_every_scene_and_level() {
         let all: Vec<EpisodeRef> =
-            Level::ALL[..3].iter().flat_map(|l| flats(Shape::Curved, *l, 56, Photographer::Robot)).collect();
+            Level::ALL[..3].iter().flat_map(|l| flats(curved(*l), 56, Photographer::Robot)).collect();
         let some = thinned(&all, 2);
         assert_eq!(some.len(), 3 * 14 * 2);
         let of_one = some.iter().filter(|e| e.level == Level::Hard && e.scene == all[0].scene);

@@ -67,6 +67,9 @@ pub struct TablesArgs {
     /// Episodes side by side; 0 for one per core.
     #[arg(long, default_value_t = 0)]
     threads: usize,
+    /// On the 72 training flats instead of the 14 test flats: to see what is lost, and mend it, without spoiling the test.
+    #[arg(long)]
+    train: bool,
     /// Through body, perception and planner as processes of their own over zenoh, instead of in this one: the same actions
     /// and scores, slower.
     #[arg(long)]
@@ -86,6 +89,9 @@ pub struct TablesArgs {
     /// Write no report.
     #[arg(long, conflicts_with = "report")]
     no_report: bool,
+    /// Print the report as JSON instead of Markdown.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Difficulties.
@@ -132,7 +138,8 @@ pub fn run(args: TablesArgs) -> anyhow::Result<Ended> {
         visual_targets(&args)?;
     }
     if !args.no_report {
-        println!("{}", report::write(&args.out, command(), notes())?);
+        let (markdown, json) = report::write(&args.out, command(), notes())?;
+        println!("{}", if args.json { json } else { markdown });
         eprintln!("written to {} as report.html, report.md and report.json", args.out.display());
     }
     Ok(Ended::Well)
@@ -185,9 +192,10 @@ fn run_episodes(args: &TablesArgs, rows: &[Row]) -> anyhow::Result<Ended> {
     let preset = if args.quick { Amounts::QUICK } else { Amounts::FULL };
     let amounts =
         Amounts { headline: args.headline.unwrap_or(preset.headline), others: args.others.unwrap_or(preset.others) };
+    let split = if args.train { Split::Train } else { Split::Test };
     let header = Header::new(rows.iter().map(|r| (r.name.to_owned(), r.config())).collect());
     let (store, done) = Store::open(&args.out, &header, args.shard)?;
-    let mut whole = Plan::new(rows, amounts, &given(args)?);
+    let mut whole = Plan::new(rows, amounts, split, &given(args)?);
     whole.keep(|task| {
         (args.levels.is_empty() || args.levels.iter().any(|l| l.level() == task.episode.level))
             && (args.sets.is_empty() || args.sets.contains(&task.set))

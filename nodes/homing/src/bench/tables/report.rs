@@ -12,8 +12,8 @@ use homing_benchmark::visual_target;
 /// Kept beside the episodes: visual target navigation's pairs.
 pub const VISUAL_TARGET: &str = "visual-target.json";
 
-/// Writes `report.md`, `report.json` and `report.html` into a folder of results, and returns the first as text.
-pub fn write(folder: &Path, command: String, notes: Vec<String>) -> anyhow::Result<String> {
+/// Writes `report.md`, `report.json` and `report.html` into a folder of results, and returns the first two as text.
+pub fn write(folder: &Path, command: String, notes: Vec<String>) -> anyhow::Result<(String, String)> {
     let records = store::read(folder)?;
     let header = store::header(folder)?;
     let info = RunInfo {
@@ -28,14 +28,12 @@ pub fn write(folder: &Path, command: String, notes: Vec<String>) -> anyhow::Resu
         ..RunInfo::default()
     };
     let report = Report::new(&info, &records);
-    let markdown = report.to_markdown();
-    for (name, text) in
-        [("report.md", markdown.clone()), ("report.json", report.to_json()?), ("report.html", report.to_html()?)]
-    {
+    let (markdown, json) = (report.to_markdown(), report.to_json()?);
+    for (name, text) in [("report.md", &markdown), ("report.json", &json), ("report.html", &report.to_html()?)] {
         let path = folder.join(name);
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    Ok(markdown)
+    Ok((markdown, json))
 }
 
 fn visual_target(folder: &Path) -> anyhow::Result<Option<visual_target::Report>> {
