@@ -1,6 +1,6 @@
-//! Frames per second of the renderer: `render_speed [SCENE] [frames]`, on a walk through the scene's bounding
+//! Frames per second of the renderer: `render_speed [SCENE] [frames] [--json]`, on a walk through the scene's bounding
 //! box. SCENE is a glTF file or the seed of a flat (default 1000). The processor time (all threads, from /proc) does not depend on what else
-//! the machine is doing.
+//! the machine is doing. With `--json` the one line that `tests/interop/render_peers.py` reads.
 
 #![expect(clippy::unwrap_used, reason = "a measuring tool may fail by panicking")]
 
@@ -22,6 +22,9 @@ fn main() {
     let loaded = begin.elapsed();
     let begin = Instant::now();
     let mut renderer = Renderer::new(scene.clone());
+    if arguments.next().is_some_and(|a| a == "--json") {
+        return say_json(&scene, &mut renderer, frames);
+    }
     println!("{}: loaded in {loaded:.0?}, prepared in {:.0?}", scene.name, begin.elapsed());
     let camera = Intrinsics::from_hfov(640, 480, 120_f64.to_radians()).unwrap();
     let poses: Vec<_> = (0..frames).map(|i| pose(&scene, i)).collect();
@@ -50,6 +53,29 @@ fn main() {
     }
 }
 
+/// One round, after a first look at a tenth of the poses.
+fn say_json(scene: &Scene, renderer: &mut Renderer, frames: usize) {
+    let camera = Intrinsics::from_hfov(640, 480, 120_f64.to_radians()).unwrap();
+    let poses: Vec<_> = (0..frames).map(|i| pose(scene, i)).collect();
+    let counts: Vec<_> = poses.iter().map(|p| renderer.count(&camera, p)).collect();
+    for pose in poses.iter().step_by(10) {
+        renderer.render(&camera, pose);
+    }
+    let (begin, begin_cpu) = (Instant::now(), cpu_ms());
+    for pose in &poses {
+        assert_eq!(renderer.render(&camera, pose).1.width(), 640);
+    }
+    let (ms, cpu_ms) = (begin.elapsed().as_secs_f64() * 1e3, cpu_ms() - begin_cpu);
+    println!(
+        r#"{{"scene": "{}", "triangles": {}, "triangles_total": {}, "ms": {:.4}, "cpu_ms": {:.4}}}"#,
+        scene.name,
+        counts.iter().map(|c| c.triangles).sum::<usize>() / frames,
+        counts[0].triangles_total,
+        ms / frames as f64,
+        cpu_ms / frames as f64
+    );
+}
+
 /// A number is the seed of a flat, anything else a glTF file.
 fn load(path: &str) -> Scene {
     match path.parse() {
@@ -58,12 +84,12 @@ fn load(path: &str) -> Scene {
     }
 }
 
-/// User time of all threads of this process, ms.
+/// User and system time of all threads of this process, ms.
 fn cpu_ms() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
     let after_name = stat.rsplit(')').next().unwrap();
-    // Field 14 of the whole line, in ticks of 10 ms.
-    after_name.split_whitespace().nth(11).unwrap().parse::<f64>().unwrap() * 10.0
+    // Fields 14 and 15 of the whole line, in ticks of 10 ms.
+    after_name.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<f64>().unwrap() * 10.0).sum()
 }
 
 /// A spiral around the middle of the scene at camera height, turning.

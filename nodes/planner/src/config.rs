@@ -93,7 +93,7 @@ pub struct PlannerConfig {
 impl Default for PlannerConfig {
     fn default() -> Self {
         Self {
-            map_side_m: 32.0,
+            map_side_m: 48.0,
             resolution_m: 0.05,
             mapper: MapperConfig::default(),
             body: BodyConfig::default(),

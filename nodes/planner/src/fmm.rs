@@ -28,9 +28,13 @@ pub enum Until {
 pub struct Marcher {
     geometry: GridGeometry,
     arrival: Vec<f32>,
-    // A front that crosses a cell in `step` at the fastest reaches no neighbour sooner than `step / sqrt(2)` later. So the
-    // cells of one bucket that wide do not depend on each other, and no order is needed among them: a ring of buckets does
-    // what a heap would, without sorting. A cell may lie in several buckets; only the one of its time counts.
+    /// The only cells that may have an arrival time.
+    marched: Window,
+    // A front that crosses a cell in `step` at the fastest reaches no neighbour sooner than `step / sqrt(2)` later, if the
+    // front comes to it from one side. So the cells of one bucket that wide hardly depend on each other, and no order is
+    // needed among them: a ring of buckets does what a heap would, without sorting. Where the front comes from two sides, a
+    // cell's time may fall into the bucket of the later side: such cells are taken before the next bucket is. A cell may
+    // lie in several buckets; only the one of its time counts.
     buckets: Vec<Vec<u32>>,
 }
 
@@ -38,7 +42,12 @@ impl Marcher {
     /// For grids of one geometry.
     #[must_use]
     pub fn new(geometry: GridGeometry) -> Self {
-        Self { geometry, arrival: vec![f32::INFINITY; geometry.len()], buckets: vec![Vec::new(); N_BUCKETS] }
+        Self {
+            geometry,
+            arrival: vec![f32::INFINITY; geometry.len()],
+            marched: Window { column_min: 0, column_max: 0, row_min: 0, row_max: 0 },
+            buckets: vec![Vec::new(); N_BUCKETS],
+        }
     }
 
     /// The grid it marches over.
@@ -56,75 +65,42 @@ impl Marcher {
     /// Marches from `source` (a cell's index) inside `window`, which must keep one cell off the grid's border. `cost` gives
     /// the front's slowness in a cell, at least 1; infinite closes it.
     pub fn march(&mut self, source: usize, window: &Window, until: Until, cost: impl Fn(usize) -> f32) {
-        self.arrival.fill(f32::INFINITY);
-        self.buckets.iter_mut().for_each(Vec::clear);
+        self.clear();
         let width = self.geometry.width;
         if source >= self.arrival.len() || !window.contains(source % width, source / width) {
             return;
         }
+        self.marched = *window;
         self.arrival[source] = 0.0;
         self.buckets[0].push(source as u32);
-        let bucket_m = 0.7 * self.geometry.resolution_m as f32;
-        let (mut now, mut n_empty) = (0_usize, 0);
+        let front = Front::new(&self.geometry, window, cost);
         let mut cells = Vec::new();
+        let (mut now, mut n_empty) = (0_usize, 0);
         while n_empty < N_BUCKETS {
-            core::mem::swap(&mut cells, &mut self.buckets[now % N_BUCKETS]);
-            n_empty = if cells.is_empty() { n_empty + 1 } else { 0 };
-            let begins = now as f32 * bucket_m;
             if let Until::Reached { index, beyond } = until
-                && begins > self.arrival[index] + beyond
+                && now as f32 * front.bucket_m > self.arrival[index] + beyond
             {
                 break;
             }
-            for index in cells.drain(..) {
-                let index = index as usize;
-                if self.bucket_of(index, bucket_m) == now {
-                    self.spread(index, window, bucket_m, &cost);
+            n_empty += 1;
+            while !self.buckets[now % N_BUCKETS].is_empty() {
+                n_empty = 0;
+                core::mem::swap(&mut cells, &mut self.buckets[now % N_BUCKETS]);
+                for index in cells.drain(..) {
+                    front.pass(index as usize, now, &mut self.arrival, &mut self.buckets);
                 }
             }
             now += 1;
         }
     }
 
-    fn bucket_of(&self, index: usize, bucket_m: f32) -> usize {
-        (self.arrival[index] / bucket_m) as usize
-    }
-
-    /// The front passes a cell: its neighbours get their times from it.
-    #[inline]
-    fn spread(&mut self, index: usize, window: &Window, bucket_m: f32, cost: &impl Fn(usize) -> f32) {
-        let width = self.geometry.width;
-        let (column, row, time) = (index % width, index / width, self.arrival[index]);
-        for (neighbour, inside) in [
-            (index - 1, column > window.column_min),
-            (index + 1, column + 1 < window.column_max),
-            (index - width, row > window.row_min),
-            (index + width, row + 1 < window.row_max),
-        ] {
-            if inside && self.arrival[neighbour] > time {
-                let slowness = cost(neighbour);
-                if slowness < f32::INFINITY {
-                    self.relax(neighbour, slowness.clamp(1.0, COST_MAX) * self.geometry.resolution_m as f32, bucket_m);
-                }
-            }
+    /// Forgets the last march. A map is mostly unknown: only the window is touched.
+    fn clear(&mut self) {
+        let (w, width) = (self.marched, self.geometry.width);
+        for row in w.row_min..w.row_max {
+            self.arrival[row * width + w.column_min..row * width + w.column_max].fill(f32::INFINITY);
         }
-    }
-
-    /// First-order upwind solution of |grad T| = cost at one cell.
-    #[inline]
-    fn relax(&mut self, index: usize, delay: f32, bucket_m: f32) {
-        let width = self.geometry.width;
-        let along = self.arrival[index - 1].min(self.arrival[index + 1]);
-        let across = self.arrival[index - width].min(self.arrival[index + width]);
-        let (near, far) = if along < across { (along, across) } else { (across, along) };
-        let gap = far - near;
-        let time =
-            if gap < delay { 0.5 * (near + far + (2.0 * delay * delay - gap * gap).sqrt()) } else { near + delay };
-        if time < self.arrival[index] {
-            self.arrival[index] = time;
-            let bucket = self.bucket_of(index, bucket_m) % N_BUCKETS;
-            self.buckets[bucket].push(index as u32);
-        }
+        self.buckets.iter_mut().for_each(Vec::clear);
     }
 
     /// Arrival time at a point, interpolated between the cells around it that the front reached; infinite if there is none.
@@ -176,5 +152,133 @@ impl Marcher {
             at = next;
         }
         path
+    }
+}
+
+/// What a march does not change.
+struct Front<F> {
+    width: usize,
+    window: Window,
+    step_m: f32,
+    bucket_m: f32,
+    buckets_per_m: f32,
+    cost: F,
+}
+
+impl<F: Fn(usize) -> f32> Front<F> {
+    fn new(geometry: &GridGeometry, window: &Window, cost: F) -> Self {
+        let step_m = geometry.resolution_m as f32;
+        let bucket_m = 0.7 * step_m;
+        Self { width: geometry.width, window: *window, step_m, bucket_m, buckets_per_m: 1.0 / bucket_m, cost }
+    }
+
+    fn bucket_of(&self, time: f32) -> usize {
+        (time * self.buckets_per_m) as usize
+    }
+
+    /// The front passes a cell of bucket `now`: its neighbours get their times from it.
+    #[inline]
+    fn pass(&self, index: usize, now: usize, arrival: &mut [f32], buckets: &mut [Vec<u32>]) {
+        let (w, width, time) = (&self.window, self.width, arrival[index]);
+        if self.bucket_of(time) != now {
+            return;
+        }
+        let (column, row) = (index % width, index / width);
+        for (neighbour, inside) in [
+            (index - 1, column > w.column_min),
+            (index + 1, column + 1 < w.column_max),
+            (index - width, row > w.row_min),
+            (index + width, row + 1 < w.row_max),
+        ] {
+            if inside && arrival[neighbour] > time {
+                let slowness = (self.cost)(neighbour);
+                if slowness < f32::INFINITY {
+                    self.relax(neighbour, slowness.clamp(1.0, COST_MAX) * self.step_m, now, arrival, buckets);
+                }
+            }
+        }
+    }
+
+    /// First-order upwind solution of |grad T| = cost at one cell.
+    #[inline]
+    fn relax(&self, index: usize, delay: f32, now: usize, arrival: &mut [f32], buckets: &mut [Vec<u32>]) {
+        let along = arrival[index - 1].min(arrival[index + 1]);
+        let across = arrival[index - self.width].min(arrival[index + self.width]);
+        let (near, far) = if along < across { (along, across) } else { (across, along) };
+        let gap = far - near;
+        let time =
+            if gap < delay { 0.5 * (near + far + (2.0 * delay * delay - gap * gap).sqrt()) } else { near + delay };
+        let before = arrival[index];
+        if time < before {
+            arrival[index] = time;
+            let bucket = self.bucket_of(time);
+            // In a bucket to come it lies already; in this one it may have been taken.
+            if bucket == now || bucket != self.bucket_of(before) {
+                buckets[bucket % N_BUCKETS].push(index as u32);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// A litter of closed cells on 8 x 8 m, the others up to `cost_max` times as slow as free ones.
+    fn littered(cost_max: f32) -> (GridGeometry, Vec<f32>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let geometry = GridGeometry::centred(8.0, 0.05);
+        let mut cost = || if rng.random_bool(0.25) { f32::INFINITY } else { rng.random_range(1.0..cost_max) };
+        (geometry, (0..geometry.len()).map(|_| cost()).collect())
+    }
+
+    fn inner(g: &GridGeometry, margin: usize) -> Window {
+        Window { column_min: margin, column_max: g.width - margin, row_min: margin, row_max: g.height - margin }
+    }
+
+    /// The definition of the solution: no cell is later than its neighbours let it be, and none is earlier.
+    #[test]
+    fn every_cell_has_the_time_its_neighbours_give_it() {
+        for cost_max in [1.001, 1.5, 3.0, 50.0] {
+            let (g, cost) = littered(cost_max);
+            let (source, window) = (g.index(80, 80), inner(&g, 1));
+            let mut marcher = Marcher::new(g);
+            marcher.march(source, &window, Until::Everywhere, |i| cost[i]);
+            let t = marcher.arrival();
+            let mut n_reached = 0;
+            for (column, row) in window.cells() {
+                let i = g.index(column, row);
+                let (along, across) = (t[i - 1].min(t[i + 1]), t[i - g.width].min(t[i + g.width]));
+                let (near, far, delay) = (along.min(across), along.max(across), 0.05 * cost[i]);
+                if i == source || cost[i] == f32::INFINITY || near == f32::INFINITY {
+                    assert!(i == source || t[i] == f32::INFINITY, "{column}, {row}: {}", t[i]);
+                    continue;
+                }
+                let gap = far - near;
+                let both = 0.5 * (near + far + (2.0 * delay * delay - gap * gap).sqrt());
+                let due = if gap < delay { both } else { near + delay };
+                assert!((t[i] - due).abs() <= 1e-6 * due, "{column}, {row}: {} instead of {due}", t[i]);
+                n_reached += 1;
+            }
+            assert!(n_reached > 18_000, "{n_reached}");
+        }
+    }
+
+    #[test]
+    fn a_march_leaves_nothing_to_the_next() {
+        let (g, cost) = littered(3.0);
+        let mut used = Marcher::new(g);
+        used.march(g.index(80, 80), &inner(&g, 1), Until::Everywhere, |_| 1.0);
+        let mut fresh = Marcher::new(g);
+        for marcher in [&mut used, &mut fresh] {
+            marcher.march(g.index(60, 70), &inner(&g, 40), Until::Everywhere, |i| cost[i].min(9.0));
+        }
+        assert_eq!(used.arrival(), fresh.arrival());
+        assert_eq!(used.arrival().iter().filter(|t| t.is_finite()).count(), 80 * 80);
+        used.march(g.index(10, 10), &inner(&g, 40), Until::Everywhere, |_| 1.0);
+        assert!(used.arrival().iter().all(|t| *t == f32::INFINITY), "the source lies outside the window");
     }
 }

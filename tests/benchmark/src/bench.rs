@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use homing_perception::onnx::FeatureChoice;
 use homing_perception::{AnyEstimator, PerceptionConfig};
@@ -68,11 +69,13 @@ pub fn bench(
         let perception = PerceptionConfig { threads: Some(1), ..options.perception };
         let mut estimator = AnyEstimator::open(perception, &options.features)?;
         while let Some(&seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let begin = Instant::now();
             let result = pool.install(|| run_seed(seed, options, &mut estimator));
+            let seconds = begin.elapsed().as_secs_f64();
             if let Ok((row, _)) = &result {
                 progress(row);
             }
-            done.lock().unwrap_or_else(PoisonError::into_inner).push((seed, result));
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((seed, seconds, result));
         }
         Ok(())
     };
@@ -81,9 +84,10 @@ pub fn bench(
         workers.into_iter().try_for_each(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     })?;
     let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    done.sort_by_key(|(seed, _)| *seed);
-    let rows: Vec<(EpisodeRow, StageSeconds)> = done.into_iter().map(|(_, r)| r).collect::<Result<_, _>>()?;
-    Ok(BenchReport::new(options, rows))
+    done.sort_by_key(|(seed, ..)| *seed);
+    let seconds = done.iter().map(|(_, seconds, _)| seconds).sum();
+    let rows: Vec<(EpisodeRow, StageSeconds)> = done.into_iter().map(|(.., r)| r).collect::<Result<_, _>>()?;
+    Ok(BenchReport::new(options, rows, seconds))
 }
 
 fn run_seed(

@@ -56,14 +56,20 @@ pub struct BenchReport {
     pub causes: BTreeMap<Cause, usize>,
     /// Mean time of each stage, milliseconds a step.
     pub stage_ms: StageSeconds,
+    /// The rest of an episode's time: making flat, episode and score, milliseconds a step.
+    pub rest_ms: f64,
+    /// Whole episodes that one core runs in a minute, while the others run theirs.
+    pub episodes_per_minute_core: f64,
+    /// Steps that one core runs in a second, everything included.
+    pub steps_per_second_core: f64,
     /// Every episode, by seed.
     pub episodes: Vec<EpisodeRow>,
 }
 
 impl BenchReport {
-    /// From all episodes, by seed, with the time each spent.
+    /// From all episodes, by seed, with the time each spent, and the seconds that all took, one after the other.
     #[must_use]
-    pub fn new(options: &BenchOptions, rows: Vec<(EpisodeRow, StageSeconds)>) -> Self {
+    pub fn new(options: &BenchOptions, rows: Vec<(EpisodeRow, StageSeconds)>, seconds: f64) -> Self {
         let n_steps: u64 = rows.iter().map(|(row, _)| row.watch.n_steps).sum();
         let stage =
             |of: fn(&StageSeconds) -> f64| 1e3 * rows.iter().map(|(_, t)| of(t)).sum::<f64>() / n_steps.max(1) as f64;
@@ -74,6 +80,8 @@ impl BenchReport {
             pose: stage(|t| t.pose),
             plan: stage(|t| t.plan),
         };
+        let staged_ms = stage(|t| t.observe + t.extract + t.matching + t.pose + t.plan);
+        let rest_ms = 1e3 * seconds / n_steps.max(1) as f64 - staged_ms;
         let episodes: Vec<EpisodeRow> = rows.into_iter().map(|(row, _)| row).collect();
         let n = episodes.len();
         let won: Vec<&Score> = episodes.iter().map(|e| &e.score).filter(|s| s.success).collect();
@@ -97,6 +105,9 @@ impl BenchReport {
             final_heading_error_deg_median: typical(|s| s.final_heading_error_deg),
             causes,
             stage_ms,
+            rest_ms,
+            episodes_per_minute_core: 60.0 * n as f64 / seconds,
+            steps_per_second_core: n_steps as f64 / seconds,
             episodes,
         }
     }
@@ -195,8 +206,13 @@ impl fmt::Display for BenchReport {
         let t = &self.stage_ms;
         writeln!(
             f,
-            "ms a step: render {:.1}, extract {:.1}, match {:.1}, pose {:.1}, plan {:.1}",
-            t.observe, t.extract, t.matching, t.pose, t.plan
+            "ms a step: render {:.1}, extract {:.1}, match {:.1}, pose {:.1}, plan {:.1}, all else {:.1}",
+            t.observe, t.extract, t.matching, t.pose, t.plan, self.rest_ms
+        )?;
+        writeln!(
+            f,
+            "on one core: {:.1} episodes a minute, {:.1} steps a second, everything included",
+            self.episodes_per_minute_core, self.steps_per_second_core
         )
     }
 }
