@@ -12,7 +12,7 @@ use crate::switches::{SwitchConfig, SwitchKind};
 /// What to do about a depth image without a single usable depth.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum BlindPolicy {
-    /// Stand still until depth comes back.
+    /// Stand still until depth comes back; but turn away from what the map knows to be right ahead, once around at most.
     Hold,
     /// Turn in place: a body that touches a wall sees nothing until it turns away.
     TurnInPlace,

@@ -5,10 +5,11 @@ mod predict;
 mod sense;
 
 use homing_core::{
-    Action, BearingHint, GoalDiscovery, GridGeometry, Mode, NavigationState, OccupancyGrid, OdometryBuffer, PlanarPose,
-    Stamp,
+    Action, BearingHint, Cell, GoalDiscovery, GridGeometry, Mode, NavigationState, OccupancyGrid, OdometryBuffer,
+    PlanarPose, Stamp,
 };
 
+use crate::angles::sin_cos;
 use crate::arrival::Arrival;
 use crate::config::{BlindPolicy, ConfigError, PlannerConfig};
 use crate::event::{Mission, StepEvent};
@@ -25,6 +26,8 @@ use crate::terrain::Terrain;
 /// Odometry readings remembered, some half an hour at 10 Hz: perception speaks of images as old as its memory.
 const ODOMETRY_KEPT: usize = 20_000;
 const HINTS_MAX: usize = 16;
+/// Nothing nearer than this may give depth, metres.
+const TOO_NEAR_M: f64 = 0.8;
 /// A faint sighting that came to nothing within this many steps is forgotten.
 const HINT_STEPS: u64 = 60;
 /// Rejected readings in a row after which the clock is taken to have restarted.
@@ -80,6 +83,8 @@ pub struct Planner {
     /// Last motion asked for: what a motion's outcome speaks of.
     commanded: Action,
     n_sweeps: u32,
+    /// Images without depth in a row.
+    n_blind: u32,
     state: NavigationState,
 }
 
@@ -111,6 +116,7 @@ impl Planner {
             restarted: false,
             commanded: Action::Hold,
             n_sweeps: 0,
+            n_blind: 0,
             state: idle_state(),
             terrain,
             config,
@@ -181,6 +187,7 @@ impl Planner {
         if sight == Integrated::Blind {
             return self.without_sight();
         }
+        self.n_blind = 0;
         self.switch();
         self.survey();
         let decision = match self.state.mode {
@@ -223,6 +230,7 @@ impl Planner {
     /// Nothing is known of where the goal may be, or of how the search goes.
     fn begin_search(&mut self) {
         self.discovery.reset();
+        (self.n_sweeps, self.n_blind) = (0, 0);
         self.hints.clear();
         self.hinted_at.clear();
         self.arrival.reset();
@@ -242,10 +250,28 @@ impl Planner {
     }
 
     fn without_sight(&mut self) -> Decision {
+        self.n_blind += 1;
+        let whole_turn = (core::f64::consts::TAU / self.config.body.turn_rad).ceil() as u32;
         match self.config.blind {
+            BlindPolicy::Hold if self.n_blind <= whole_turn && self.faces_obstacle() => {
+                Decision::new(Action::TurnLeft, "too near to something to see: turning away")
+            }
             BlindPolicy::Hold => Decision::hold("blind: no usable depth"),
             BlindPolicy::TurnInPlace => Decision::new(Action::TurnLeft, "blind: turning until depth comes back"),
         }
+    }
+
+    /// The map knows of something right ahead, where a depth camera may be too near to see it.
+    fn faces_obstacle(&self) -> bool {
+        let (map, pose) = (self.mapper.map(), &self.state.pose);
+        let step_m = 0.5 * self.config.resolution_m;
+        let is_occupied = |off_rad: f64, reach_m: f64| {
+            let (sin, cos) = sin_cos(pose.yaw_rad + off_rad);
+            let cell = map.geometry.cell_at(pose.x_m + reach_m * cos, pose.y_m + reach_m * sin);
+            cell.is_some_and(|(column, row)| map.at(column, row) == Cell::Occupied)
+        };
+        let reaches = (1..).map(|k| f64::from(k) * step_m).take_while(|reach_m| *reach_m <= TOO_NEAR_M);
+        reaches.into_iter().any(|reach_m| [-0.3, 0.0, 0.3].iter().any(|off_rad| is_occupied(*off_rad, reach_m)))
     }
 
     /// SLING's switches (3.4).

@@ -207,6 +207,20 @@ fn a_stale_a_missing_and_a_blind_observation_hold() {
 }
 
 #[test]
+fn too_near_a_wall_to_see_it_turns_away_once_around_and_then_stands() {
+    let mut planner = planner(1);
+    planner.step(Stamp(0), &start(looking_at_a_wall(0.6, 0, PlanarPose::default())));
+    let blind_at = |k: u64| {
+        let mut seen = looking_at_a_wall(0.6, k * 500_000_000, PlanarPose::default());
+        seen.depth = Arc::new(DepthImage::from_metres(64, 48, vec![0.0; 64 * 48]).unwrap());
+        StepEvent { observation: Some(seen), perception: Perception::Present, ..StepEvent::nothing() }
+    };
+    let actions: Vec<Action> = (1..=30).map(|k| planner.step(Stamp(k * 500_000_000), &blind_at(k))).collect();
+    assert!(actions[..24].iter().all(|a| *a == Action::TurnLeft), "{actions:?}");
+    assert!(actions[24..].iter().all(|a| *a == Action::Hold), "{actions:?}");
+}
+
+#[test]
 fn without_perception_it_explores_and_says_so() {
     let mut planner = planner(1);
     let action = planner.step(Stamp(0), &start(looking_at_a_wall(3.0, 0, PlanarPose::default())));

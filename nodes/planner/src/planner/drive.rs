@@ -13,8 +13,8 @@ use crate::terrain::Window;
 
 /// Steps of an approach without coming closer before something else is tried.
 const STALLED_MAX: u32 = 50;
-/// Times the whole flat is searched again after nothing was left to explore.
-const SWEEPS_MAX: u32 = 1;
+/// Times the whole flat is searched again after nothing was left to explore: once on the map there is, then on new ones.
+const SWEEPS_MAX: u32 = 3;
 
 impl Planner {
     /// Measures the ground around everything that matters now.
@@ -141,16 +141,21 @@ impl Planner {
         }
     }
 
-    /// Nothing is left to explore: believe again what was discarded and look once more; then give up.
+    /// Nothing is left to explore: believe again what was discarded and look once more; then doubt the map, in which odometry
+    /// that drifts may have closed every way; then give up.
     fn start_over(&mut self) -> Decision {
         let forgiven = self.filter.forgive() || self.mapper.forget_bumps() > 0;
-        if forgiven || self.n_sweeps < SWEEPS_MAX {
-            self.n_sweeps += 1;
-            self.discovery.reset();
+        self.n_sweeps += u32::from(!forgiven);
+        if self.n_sweeps > SWEEPS_MAX {
+            self.state.mode = Mode::Failed;
+            return Decision::hold("nothing left to explore, goal not found");
+        }
+        self.discovery.reset();
+        if forgiven || self.n_sweeps == 1 {
             return Decision::hold("nothing left to explore: looking again");
         }
-        self.state.mode = Mode::Failed;
-        Decision::hold("nothing left to explore, goal not found")
+        self.mapper.reset();
+        Decision::hold("nothing left to explore: mapping anew")
     }
 
     fn follow(&mut self, route: &Route, why: &str) -> Decision {
