@@ -79,7 +79,7 @@ fn clearances_are_exact_next_to_a_wall() {
 #[test]
 fn a_goal_inside_a_wall_is_refused() {
     let grid = NavGrid::new(&room(5.0, 4.0, 0.0), 1.5).unwrap();
-    let space = grid.free_space("room", 0.18).unwrap();
+    let space = Arc::new(grid.free_space("room", 0.18).unwrap());
     assert!(GeodesicField::to(&space, (0.05, 2.0)).is_err());
     assert!(GeodesicField::to(&space, (-9.0, f64::NAN)).is_err());
     let field = GeodesicField::to(&space, (2.0, 2.0)).unwrap();

@@ -67,7 +67,7 @@ fn walled_square() -> Scene {
 fn the_way_around_a_wall_has_the_length_of_the_taut_string() {
     let grid = NavGrid::new(&walled_square(), 1.5).unwrap();
     let radius = 0.18;
-    let space = grid.free_space("square", radius).unwrap();
+    let space = Arc::new(grid.free_space("square", radius).unwrap());
     let field = GeodesicField::to(&space, (3.0, 1.0)).unwrap();
     assert!((field.distance_m(3.0, 2.5).unwrap() - 1.5).abs() < 1e-9, "a straight way is exact");
     // A taut string: tangents from both points to the circle of the robot's radius around the wall's end, and the arc

@@ -67,6 +67,7 @@ mod tests {
             goal_id: 1,
             sighting,
             n_matches: 40,
+            switch_probability: None,
             matched_points: Vec::new(),
             times: StageTimes::default(),
         }

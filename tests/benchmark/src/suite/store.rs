@@ -249,6 +249,7 @@ mod tests {
 
     fn record(id: &str) -> EpisodeRecord {
         let finish = Finish {
+            success_m: 1.0,
             stopped: true,
             steps: 9,
             last_mile_steps: 3,

@@ -13,6 +13,7 @@ use crate::{Cause, Watch};
 /// An episode of 4 m that took 10 steps and 2 s, with an SPL of `spl` if it was won.
 fn record(row: &str, set: &str, id: &str, spl: Option<f64>) -> EpisodeRecord {
     let finish = Finish {
+        success_m: 1.0,
         stopped: spl.is_some(),
         steps: 10,
         last_mile_steps: 2,
@@ -37,6 +38,7 @@ fn record(row: &str, set: &str, id: &str, spl: Option<f64>) -> EpisodeRecord {
         first_heading_rad: None,
         times: StageSeconds { observe: 0.5, extract: 0.5, matching: 0.25, pose: 0.25, plan: 0.25 },
         wall_s: 2.0,
+        commit: "abc".to_owned(),
     }
 }
 
