@@ -1,5 +1,5 @@
-//! How long drawing the test folds takes, and which flats offer no episode of a kind: `fold_cost [TASKS]` prints a line for
-//! every fold.
+//! How long drawing the test folds takes, and which flats offer no episode of a kind: `fold_cost [TASKS]` prints a line
+//! for every fold.
 
 #![expect(clippy::unwrap_used, reason = "a tool for measuring may fail by panicking")]
 

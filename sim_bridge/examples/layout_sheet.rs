@@ -1,5 +1,5 @@
-//! Shows what a navigability map became: `layout_sheet MAP.png PREFIX` writes PREFIX_views.png, twelve views from places
-//! spread over the floor, and prints triangles, textures, times.
+//! Shows what a navigability map became: `layout_sheet MAP.png PREFIX` writes PREFIX_views.png, twelve views from
+//! places spread over the floor, and prints triangles, textures, times.
 
 #![expect(clippy::unwrap_used, reason = "a tool for looking at scenes may fail by panicking")]
 

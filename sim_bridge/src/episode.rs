@@ -54,8 +54,13 @@ pub struct Viewpoint {
     /// Horizontal field of view, radians.
     pub hfov_rad: f64,
     /// How far it looks up, radians; negative down. Robots' own cameras are level.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_level")]
     pub pitch_rad: f64,
+}
+
+/// Files keep a pitch only where there is one: those of the frozen benchmark stay as they are.
+fn is_level(pitch_rad: &f64) -> bool {
+    *pitch_rad == 0.0
 }
 
 impl Default for Viewpoint {
@@ -132,7 +137,7 @@ pub struct Episode {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub view_points: Vec<(f64, f64)>,
     /// How near to that place is success, metres.
-    #[serde(default = "success_m")]
+    #[serde(default = "success_m", skip_serializing_if = "is_usual")]
     pub success_m: f64,
 }
 
@@ -159,6 +164,10 @@ impl Shape {
         let turned = wrap_angle(goal.yaw_rad - start.yaw_rad).abs() >= CURVED_HEADING_RAD;
         if shortest_path_m >= CURVED_RATIO * straight_m || turned { Shape::Curved } else { Shape::Straight }
     }
+}
+
+fn is_usual(distance_m: &f64) -> bool {
+    *distance_m == SUCCESS_M
 }
 
 /// Difficulty by the length of the shortest path (NRNS; "extra" after Mezghani et al.).
@@ -280,10 +289,10 @@ const ARRIVAL_M: f64 = 0.5;
 /// Nothing is farther than this, metres.
 const HORIZON_M: f64 = 60.0;
 
-/// Draws an episode after NRNS (`generate_test_instances.py`): start and goal uniform over the free space, start heading
-/// uniform, goal heading that in which a follower of the shortest path arrives, the photo taken there. One thing is
-/// added: goal views whose median depth along the horizon is at most [`GOAL_DEPTH_M_MIN`] are drawn again, because a photo of bare wall
-/// names no place.
+/// Draws an episode after NRNS (`generate_test_instances.py`): start and goal uniform over the free space, start
+/// heading uniform, goal heading that in which a follower of the shortest path arrives, the photo taken there. One
+/// thing is added: goal views whose median depth along the horizon is at most [`GOAL_DEPTH_M_MIN`] are drawn again,
+/// because a photo of bare wall names no place.
 ///
 /// Equal arguments give equal episodes on every machine.
 ///

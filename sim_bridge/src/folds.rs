@@ -1,7 +1,7 @@
 //! The benchmark's own folds: straight and curved, easy to hard, as NRNS divides its episodes, over generated flats.
 //!
-//! Gibson as the papers use it has 72 scenes to learn from and 14 to be tested in. So have these folds; their flats appear
-//! nowhere else, and in particular in no training set of ours.
+//! Gibson as the papers use it has 72 scenes to learn from and 14 to be tested in. So have these folds; their flats
+//! appear nowhere else, and in particular in no training set of ours.
 
 use core::ops::Range;
 
@@ -84,15 +84,15 @@ impl Fold {
     /// Draws the episode of a task in its flat.
     ///
     /// # Errors
-    /// [`DrawError`] where the flat offers none: few have a straight way of 5 to 10 m, and the papers' straight and hard
-    /// fold is short of episodes, too. Who fills a fold goes on to the next task.
+    /// [`DrawError`] where the flat offers none: few have a straight way of 5 to 10 m, and the papers' straight and
+    /// hard fold is short of episodes, too. Who fills a fold goes on to the next task.
     pub fn draw(self, arena: &Arena, task: Task, camera: Viewpoint) -> Result<Episode, DrawError> {
         episode::draw(arena, task.episode, &self.spec(camera))
     }
 }
 
-/// A camera held by a person rather than the robot, drawn from a seed as IGL-Nav draws its free-view goals: 0.8 to 1.5 m
-/// above the floor, 60 to 120 degrees wide, tilted by up to 15 degrees, in one of four picture sizes.
+/// A camera held by a person rather than the robot, drawn from a seed as IGL-Nav draws its free-view goals: 0.8 to 1.5
+/// m above the floor, 60 to 120 degrees wide, tilted by up to 15 degrees, in one of four picture sizes.
 #[must_use]
 pub fn free_viewpoint(seed: u64) -> Viewpoint {
     const SIZES: [(u32, u32); 4] = [(640, 480), (640, 360), (512, 512), (480, 640)];

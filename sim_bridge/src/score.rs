@@ -54,8 +54,8 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// Measures how a robot ended against its task: distances are to the nearest of its view points, or to the photo's place
-    /// where it has none.
+    /// Measures how a robot ended against its task: distances are to the nearest of its view points, or to the photo's
+    /// place where it has none.
     #[must_use]
     pub fn new(arena: &Arena, episode: &Episode, ending: &Ending) -> Self {
         let (final_distance_m, final_straight_m) = distances_left(arena, episode, (ending.pose.x_m, ending.pose.y_m));
@@ -114,8 +114,8 @@ pub struct Score {
 }
 
 impl Score {
-    /// The strict score, Habitat's: success is the robot's own stop within [`STEPS_MAX`] actions and the episode's success
-    /// distance of the goal along the floor.
+    /// The strict score, Habitat's: success is the robot's own stop within [`STEPS_MAX`] actions and the episode's
+    /// success distance of the goal along the floor.
     #[must_use]
     pub fn strict(finish: &Finish) -> Self {
         let distance = finish.final_distance_m;

@@ -1,8 +1,9 @@
 //! Habitat's world frame and ours.
 //!
-//! Habitat is y up and its agents look along -z; so are glTF scenes. We are z up: (x, y, z) becomes (x, -z, y), the same
-//! quarter turn about x as in [`crate::gltf_scene`], so that a scene file and the episodes in it stay together. It is a
-//! rotation, not a mirror: left stays left. A heading is counted from +x here and from -z there, a quarter turn apart.
+//! Habitat is y up and its agents look along -z; so are glTF scenes. We are z up: (x, y, z) becomes (x, -z, y), the
+//! same quarter turn about x as in [`crate::gltf_scene`], so that a scene file and the episodes in it stay together. It
+//! is a rotation, not a mirror: left stays left. A heading is counted from +x here and from -z there, a quarter turn
+//! apart.
 
 use core::f64::consts::FRAC_PI_2;
 

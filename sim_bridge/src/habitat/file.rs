@@ -75,8 +75,8 @@ pub enum HabitatError {
 pub struct EpisodeFile;
 
 impl EpisodeFile {
-    /// Reads a file of ImageNav or PointNav episodes (a JSON list, or an object with `episodes`), of NRNS episodes, or of
-    /// InstanceImageNav v3. Whether a file is compressed is told by its first bytes.
+    /// Reads a file of ImageNav or PointNav episodes (a JSON list, or an object with `episodes`), of NRNS episodes, or
+    /// of InstanceImageNav v3. Whether a file is compressed is told by its first bytes.
     ///
     /// # Errors
     /// [`HabitatError`] naming the file, and the episode where one is at fault.
@@ -104,8 +104,8 @@ impl EpisodeFile {
         episodes.into_iter().enumerate().map(one).collect()
     }
 
-    /// Writes episodes in the format of ImageNav, an object with `episodes`; compressed if the name ends in `.gz`. Goals
-    /// have a `rotation`, and `info` keeps under `homing` what Habitat's format has no place for.
+    /// Writes episodes in the format of ImageNav, an object with `episodes`; compressed if the name ends in `.gz`.
+    /// Goals have a `rotation`, and `info` keeps under `homing` what Habitat's format has no place for.
     ///
     /// # Errors
     /// [`HabitatError::Write`] naming the file.

@@ -2,8 +2,8 @@
 //!
 //! Habitat's ImageGoalSensor draws the angle about its y axis as
 //! `numpy.random.RandomState(abs(hash(episode_id)) % 2**32).uniform(0, 2 * pi)`. Python's hash of a number is a number that
-//! everybody gets; that of a text depends on PYTHONHASHSEED, for which 0 is taken here: the only value for which published
-//! figures can be had again.
+//! everybody gets; that of a text depends on PYTHONHASHSEED, for which 0 is taken here: the only value for which
+//! published figures can be had again.
 
 use core::f64::consts::TAU;
 use core::hash::Hasher;

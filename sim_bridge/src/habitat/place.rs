@@ -14,7 +14,8 @@ use crate::geodesic::GeodesicField;
 
 /// Points this far outside the free space are moved to it, metres (Habitat's `snap_point`).
 pub const SNAP_M: f64 = 0.25;
-/// A navigation mesh may lie this far above or below the floor it was made from, metres (NRNS takes as much for one floor).
+/// A navigation mesh may lie this far above or below the floor it was made from, metres (NRNS takes as much for one
+/// floor).
 const MESH_FLOOR_M: f64 = 0.35;
 
 /// A point of an episode.

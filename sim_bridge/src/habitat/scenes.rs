@@ -65,8 +65,8 @@ fn split_floor(name: &str) -> Option<(&str, f64)> {
     Some((scene, height.parse().ok()?))
 }
 
-/// Finds the scene of an episode that starts at a height (Habitat's frame, metres): a generated flat by its number, a glTF
-/// file in the folder (at the id's own path or at its name alone), else the map of the nearest floor.
+/// Finds the scene of an episode that starts at a height (Habitat's frame, metres): a generated flat by its number, a
+/// glTF file in the folder (at the id's own path or at its name alone), else the map of the nearest floor.
 ///
 /// # Errors
 /// [`SceneMissing`] naming the folder and what was looked for.

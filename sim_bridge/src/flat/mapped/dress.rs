@@ -1,5 +1,5 @@
-//! What hangs on the walls of a mapped scene and stands flat against them. All of it is thin and in nobody's way: the map
-//! alone says where one can go.
+//! What hangs on the walls of a mapped scene and stands flat against them. All of it is thin and in nobody's way: the
+//! map alone says where one can go.
 
 use core::cell::Cell;
 

@@ -1,4 +1,5 @@
-//! What stands in the open: closed parts of a map with navigable floor all around them become blocks as high as furniture.
+//! What stands in the open: closed parts of a map with navigable floor all around them become blocks as high as
+//! furniture.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -117,10 +117,10 @@ struct Description {
 }
 
 impl NavMap {
-    /// Reads a map. Rows run against Habitat's x, columns along its z. Scale and place are those of the published Gibson
-    /// maps (row = (90.0399 - x) / s, column = (z + 62.3241) / s, s = 152.364 m / columns) unless `NAME.toml` beside the
-    /// map says otherwise (`metres_per_pixel`, `x_at_row_0_m`, `z_at_column_0_m`, `floor_y_m`). The floor's height is the
-    /// number after the name's last underscore, else 0.
+    /// Reads a map. Rows run against Habitat's x, columns along its z. Scale and place are those of the published
+    /// Gibson maps (row = (90.0399 - x) / s, column = (z + 62.3241) / s, s = 152.364 m / columns) unless `NAME.toml`
+    /// beside the map says otherwise (`metres_per_pixel`, `x_at_row_0_m`, `z_at_column_0_m`, `floor_y_m`). The floor's
+    /// height is the number after the name's last underscore, else 0.
     ///
     /// # Errors
     /// [`MapError`] naming the file and what is wrong with it.

@@ -1,8 +1,9 @@
 //! A scene from a navigability map: real rooms and real ways, with our own walls and furniture.
 //!
-//! The published benchmarks give maps of where an agent can be, not what there is to see. Walls are raised around the map
-//! a little outside its border, what stands in the open becomes furniture, and every room gets floor, wall and pictures of
-//! its own. The scene is a function of the map alone: equal maps give equal scenes, bit for bit, on every machine.
+//! The published benchmarks give maps of where an agent can be, not what there is to see. Walls are raised around the
+//! map a little outside its border, what stands in the open becomes furniture, and every room gets floor, wall and
+//! pictures of its own. The scene is a function of the map alone: equal maps give equal scenes, bit for bit, on every
+//! machine.
 
 mod contour;
 mod dress;

@@ -12,7 +12,7 @@ const NECK_SHARE: f64 = 0.62;
 /// A room smaller than this belongs to its neighbour, square metres.
 const ROOM_M2_MIN: f64 = 2.5;
 /// A room in which the way from one end to the other is longer than this is divided, metres: long corridors, halls.
-const LONG_M: f64 = 9.0;
+const LONG_M: f64 = 6.0;
 /// Floors and looks reach this far beyond the map, metres: under the walls.
 pub(super) const BEYOND_M: f64 = 0.42;
 
@@ -271,7 +271,7 @@ mod tests {
         let area: f64 = rooms.iter().map(|r| r.area_m2).sum();
         assert!((area - 61.0 * 0.25).abs() < 1e-9);
         let wide = ["......#......", ".............", ".............", ".............", "......#......"];
-        assert_eq!(Regions::of(&map(&wide, 0.5)).rooms.len(), 1);
+        assert_eq!(Regions::of(&map(&wide, 0.35)).rooms.len(), 1);
     }
 
     #[test]

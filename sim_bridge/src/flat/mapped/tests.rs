@@ -50,7 +50,8 @@ fn what_the_map_calls_navigable_is_free_and_what_it_closes_is_not() {
         }
     }
     assert_eq!(free, n, "the centres of all navigable pixels");
-    // Row 17, column 46 is the middle of the table; row 10, column 29 that of the wall. x = 10 - 0.12 row, z = 0.12 column - 3.
+    // Row 17, column 46 is the middle of the table; row 10, column 29 that of the wall. x = 10 - 0.12 row, z = 0.12
+    // column - 3.
     for (row, column) in [(17.0, 46.0), (10.0, 29.5)] {
         let (x, y) = (10.0 - 0.12 * row, -(0.12 * column - 3.0));
         assert!(!arena.space().contains(x, y), "row {row}, column {column}");

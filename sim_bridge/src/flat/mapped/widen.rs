@@ -1,8 +1,8 @@
 //! From where an agent's centre can be to the floor between the walls.
 //!
-//! A map of agents' centres ends one agent's radius before the walls. So the floor is wider than the map, but widening must
-//! not join what a thin wall divides, nor swallow a chair in the open: cells are added nearest first, and only where that
-//! changes neither the number of floors nor that of holes (simple points; Kong and Rosenfeld 1989).
+//! A map of agents' centres ends one agent's radius before the walls. So the floor is wider than the map, but widening
+//! must not join what a thin wall divides, nor swallow a chair in the open: cells are added nearest first, and only
+//! where that changes neither the number of floors nor that of holes (simple points; Kong and Rosenfeld 1989).
 
 use homing_core::GridGeometry;
 
