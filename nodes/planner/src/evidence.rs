@@ -19,6 +19,8 @@ const PER_CELL: usize = 4;
 pub struct Evidence {
     /// Matches that count: off the floor, and at most a few for each part of the image.
     pub n_inliers: usize,
+    /// Matches off the floor, however crowded.
+    pub n_off_floor: usize,
     /// Image cells (of 48) that hold such a match; `None` if the estimate came without its matches.
     pub n_cells: Option<usize>,
 }
@@ -34,7 +36,7 @@ pub struct View<'a> {
 /// Weighs an estimate by its matches. `view` is the image it was made from, if it is still at hand.
 pub fn weigh(n_inliers: usize, matches: &[MatchedPoint], camera: &Intrinsics, view: Option<&View<'_>>) -> Evidence {
     if matches.is_empty() {
-        return Evidence { n_inliers, n_cells: None };
+        return Evidence { n_inliers, n_off_floor: n_inliers, n_cells: None };
     }
     let mut cells = [false; COLUMNS * ROWS];
     let mut n_off_floor = 0;
@@ -51,7 +53,7 @@ pub fn weigh(n_inliers: usize, matches: &[MatchedPoint], camera: &Intrinsics, vi
     let n_cells = cells.iter().filter(|cell| **cell).count();
     // The list of matches may be shorter than their number.
     let n_off_floor = n_inliers * n_off_floor / matches.len();
-    Evidence { n_inliers: n_off_floor.min(PER_CELL * n_cells), n_cells: Some(n_cells) }
+    Evidence { n_inliers: n_off_floor.min(PER_CELL * n_cells), n_off_floor, n_cells: Some(n_cells) }
 }
 
 fn is_on_floor(point: &MatchedPoint, camera: &Intrinsics, view: &View<'_>) -> bool {

@@ -199,7 +199,7 @@ impl GoalFilter {
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let suffices = |rigour| measurement.evidence.suffices(measurement.range_m, measurement.turn_rad, rigour);
         if let Some((_, i)) = closest {
-            if suffices(KNOWN_PLACE * self.rigour) {
+            if suffices(KNOWN_PLACE * self.rigour) || self.hypotheses[i].is_borne_out_by(measurement) {
                 self.hypotheses[i].fuse(measurement, step);
                 return Joined::Fused;
             }

@@ -12,6 +12,10 @@ const NEW_VIEW_RAD: f64 = 0.09;
 const STALE_VIEW: f64 = 0.2;
 /// Misses from places nearer than this are one miss, metres.
 const SAME_PLACE_M: f64 = 0.2;
+/// A place that was seen so often, on so long a way towards it (metres), is known by a crowd of matches alone.
+const APPROACHED_VIEWS: usize = 5;
+const APPROACHED_M: f64 = 1.0;
+const CROWD: usize = 100;
 /// Share of the old support that a new view replaces: what is seen now, from nearer, says more than what was seen often.
 const LEAK: f64 = 0.1;
 
@@ -123,6 +127,15 @@ impl Hypothesis {
         self.farthest_m = self.farthest_m.max(measurement.range_m);
         self.widest_rad = self.widest_rad.max(measurement.turn_rad);
         (self.n_misses, self.n_missed, self.missed_from) = (0, 0, None);
+    }
+
+    /// Whether an agreeing measurement speaks for it though its matches crowd in a small part of the image. At the end of a bare
+    /// corridor even the photo's own view binds little of it; what repeats by chance does not stay with a place through an
+    /// approach.
+    pub fn is_borne_out_by(&self, measurement: &Measurement) -> bool {
+        self.n_fused >= APPROACHED_VIEWS
+            && self.farthest_m > measurement.range_m + APPROACHED_M
+            && measurement.evidence.n_off_floor >= CROWD
     }
 
     /// Whether `pose` is where the hypothesis was seen or missed last: turning there shows the same things again, and what was

@@ -140,7 +140,7 @@ fn a_route_leads_around_a_wall_and_keeps_its_distance() {
 }
 
 fn sure(n_inliers: usize) -> Evidence {
-    Evidence { n_inliers, n_cells: None }
+    Evidence { n_inliers, n_off_floor: n_inliers, n_cells: None }
 }
 
 fn seen(filter: &GoalFilter, from: PlanarPose, goal: PlanarPose, n_inliers: usize) -> Measurement {
@@ -191,6 +191,23 @@ fn turning_where_a_goal_was_seen_refutes_nothing_and_driving_on_without_it_does(
     assert!((0..9).all(|_| doubt(0.0) == Doubt::None), "it was seen from there");
     let driving_on: Vec<Doubt> = (1..=4).flat_map(|i| [0.3 * f64::from(i); 2]).map(&mut doubt).collect();
     assert_eq!(driving_on.iter().position(|d| *d == Doubt::Refuted), Some(6), "four places, one miss each");
+}
+
+#[test]
+fn a_crowd_of_matches_confirms_a_place_that_was_approached_and_no_other() {
+    let place = PlanarPose { x_m: 2.4, y_m: 0.0, yaw_rad: 0.0 };
+    let crowded = |filter: &GoalFilter, x_m: f64, n_off_floor: usize| {
+        let seen = seen(filter, PlanarPose { x_m, ..LEVEL }, place, 20);
+        Measurement { evidence: Evidence { n_inliers: 20, n_off_floor, n_cells: Some(5) }, ..seen }
+    };
+    let mut filter = GoalFilter::new(FilterConfig::default());
+    filter.join(&seen(&filter, LEVEL, place, 20), 1);
+    assert_eq!(filter.join(&crowded(&filter, 2.3, 400), 2), Joined::Faint, "it was seen once");
+    for x_m in [0.3, 0.6, 0.9, 1.2] {
+        assert_eq!(filter.join(&seen(&filter, PlanarPose { x_m, ..LEVEL }, place, 20), 3), Joined::Fused);
+    }
+    assert_eq!(filter.join(&crowded(&filter, 2.3, 60), 4), Joined::Faint, "a few matches are no crowd");
+    assert_eq!(filter.join(&crowded(&filter, 2.3, 400), 5), Joined::Fused);
 }
 
 #[test]

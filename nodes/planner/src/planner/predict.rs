@@ -28,7 +28,7 @@ impl Planner {
             }
             Sighting::Bearing { .. } => {}
             Sighting::Pose { t_camera_goal, covariance, n_inliers, .. } => {
-                let evidence = Evidence { n_inliers: *n_inliers, n_cells: None };
+                let evidence = Evidence { n_inliers: *n_inliers, n_off_floor: *n_inliers, n_cells: None };
                 let stamp = estimate.stamp;
                 measured = self.filter.measure(stamp, t_odom_base, t_base_camera, t_camera_goal, covariance, evidence);
             }

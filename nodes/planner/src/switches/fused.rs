@@ -51,7 +51,7 @@ mod tests {
     /// Seen at step 10 from the origin, `x_m` ahead.
     fn hypothesis(x_m: f64, support: f64, n_fused: usize) -> Hypothesis {
         let pose = PlanarPose { x_m, y_m: 0.0, yaw_rad: 0.0 };
-        let evidence = Evidence { n_inliers: 1, n_cells: None };
+        let evidence = Evidence { n_inliers: 1, n_off_floor: 1, n_cells: None };
         let from = PlanarPose::default();
         let (stamp, covariance) = (Stamp(0), Matrix3::identity());
         let measurement = Measurement { stamp, pose, covariance, evidence, from, range_m: x_m, turn_rad: 0.0 };
