@@ -134,7 +134,7 @@ impl<'a> Lockstep<'a> {
         estimator: &'a mut AnyEstimator,
         trial: &'a Trial,
     ) -> Result<Self, RunError> {
-        let mut robot = Simulator::new(Arc::clone(arena), trial.sim.clone())?;
+        let mut robot = Simulator::new(Arc::clone(arena), trial.sim)?;
         robot.reset(episode)?;
         let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
         estimator.set_goal(GoalPhoto { id: GOAL_ID, rgb, intrinsics: episode.camera.intrinsics()? })?;

@@ -43,7 +43,7 @@ pub enum SuiteError {
         /// The episode.
         id: String,
         /// Why not.
-        source: RunError,
+        source: Box<RunError>,
     },
     /// A result could not be kept.
     #[error(transparent)]
@@ -116,7 +116,13 @@ fn run_group(
     let failed = |task: &Task| {
         let (set, id) = (task.set.clone(), task.episode.id.clone());
         let scene = format!("{:?}", task.episode.scene);
-        move |source: RunError| SuiteError::Episode { row: row.name.to_owned(), set, scene, id, source }
+        move |source: RunError| SuiteError::Episode {
+            row: row.name.to_owned(),
+            set,
+            scene,
+            id,
+            source: Box::new(source),
+        }
     };
     let first = &group[0];
     let mut course = lay(row).map_err(failed(first))?;
