@@ -169,11 +169,16 @@ impl SessionSettings {
 
 /// Log lines go to stderr; RUST_LOG overrides what is shown.
 pub fn start_log() {
+    start_log_from("info");
+}
+
+/// The same, from this level on: `warn` for a program that opens the same models again and again.
+pub fn start_log_from(level: &str) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
-        EnvFilter::new(
-            "info,zenoh=error,zenoh::net::routing=off,zenoh_transport=error,zenoh_shm=error,hiroz=error,re_log_types=error,\
-             re_chunk=error,re_chunk_store=error,ort=error",
-        )
+        EnvFilter::new(format!(
+            "{level},zenoh=error,zenoh::net::routing=off,zenoh_transport=error,zenoh_shm=error,hiroz=error,\
+             re_log_types=error,re_chunk=error,re_chunk_store=error,ort=error",
+        ))
     });
     // A second call in one process changes nothing.
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_target(false);

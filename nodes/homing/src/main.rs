@@ -61,9 +61,11 @@ pub enum Ended {
 }
 
 fn main() -> ExitCode {
-    homing_protocol::process::start_log();
+    let command = Args::parse().command;
+    // A benchmark opens its models again for every scene, and would say each time on what they run.
+    homing_protocol::process::start_log_from(if matches!(command, Command::Bench(_)) { "warn" } else { "info" });
     leave_quietly_when_nobody_reads();
-    let ended = match Args::parse().command {
+    let ended = match command {
         Command::Demo(args) => demo::run(args),
         Command::Goto(args) => goto::run(args),
         Command::Replay(args) => replay::run(args),
