@@ -1,6 +1,6 @@
 //! Episodes: where a robot starts and which photo it is shown, drawn as NRNS draws them.
 
-use homing_core::{Base, Camera, Intrinsics, IntrinsicsError, PlanarPose, RgbImage, Transform, wrap_angle};
+use homing_core::{Base, Camera, Intrinsics, IntrinsicsError, Odom, PlanarPose, RgbImage, Transform, wrap_angle};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -110,6 +110,13 @@ pub fn t_world_base(arena: &Arena, pose: PlanarPose) -> Transform<World, Base> {
     let lift = nalgebra::Isometry3::translation(0.0, 0.0, arena.grid().floor_z_m());
     let on_zero: Transform<World, Base> = pose.to_transform();
     Transform::new(lift * on_zero.isometry())
+}
+
+/// A pose of the world frame in the odometry frame that began at `start`. Ground truth.
+#[must_use]
+pub fn in_odom(arena: &Arena, start: FloorPose, pose: PlanarPose) -> PlanarPose {
+    let t_world_odom: Transform<World, Odom> = Transform::new(*t_world_base(arena, start.into()).isometry());
+    (t_world_odom.inverse() * t_world_base(arena, pose)).planar()
 }
 
 /// One task: everything in the world frame, so robots never see it.

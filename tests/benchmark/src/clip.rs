@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use homing_core::{GoalEstimate, GoalPhoto, NavigationState, OccupancyGrid, Odometry, PlanarPose, RgbdFrame};
 use homing_monitor::{Recorder, RecorderConfig, RecorderError, Update};
 use homing_sim::arena::Arena;
-use homing_sim::episode::Episode;
+use homing_sim::episode::{Episode, in_odom};
 use thiserror::Error;
 
 use crate::RunError;
@@ -59,7 +59,7 @@ struct Step {
     estimate: GoalEstimate,
     state: NavigationState,
     map: Arc<OccupancyGrid>,
-    truth_odom: PlanarPose,
+    pose_truth: PlanarPose,
 }
 
 /// The steps of one episode that would be shown if it failed.
@@ -100,13 +100,13 @@ impl Clip {
             estimate: record.estimate.clone(),
             state: record.state.clone(),
             map: Arc::new(record.map.clone()),
-            truth_odom: in_odom(self.episode.start.into(), record.pose_truth),
+            pose_truth: record.pose_truth,
         };
         self.last.push_back(step);
         if self.last.len() > LAST_STEPS
             && let Some(step) = self.last.pop_front()
             && self.in_view.len() < VIEW_STEPS
-            && is_in_view(&self.arena, &self.episode, in_world(self.episode.start.into(), step.truth_odom))
+            && is_in_view(&self.arena, &self.episode, step.pose_truth)
         {
             self.in_view.push(step);
         }
@@ -146,7 +146,7 @@ impl Clip {
         for step in self.in_view.into_iter().chain(self.last) {
             let stamp = step.frame.stamp;
             offer(step.odometry.into());
-            offer(Update::TruthPose { stamp, pose: step.truth_odom });
+            offer(Update::TruthPose { stamp, pose: in_odom(&self.arena, self.episode.start, step.pose_truth) });
             offer(step.frame.into());
             offer(step.estimate.into());
             offer(Update::Map(step.map));
@@ -161,24 +161,5 @@ impl Clip {
                 Err(ClipError::Incomplete { path, reason: error.unwrap_or("the recorder did not keep up").to_owned() })
             }
         }
-    }
-}
-
-fn in_odom(start: PlanarPose, pose: PlanarPose) -> PlanarPose {
-    let (dx, dy) = (pose.x_m - start.x_m, pose.y_m - start.y_m);
-    let (cos, sin) = (libm::cos(start.yaw_rad), libm::sin(start.yaw_rad));
-    PlanarPose {
-        x_m: cos * dx + sin * dy,
-        y_m: cos * dy - sin * dx,
-        yaw_rad: homing_core::wrap_angle(pose.yaw_rad - start.yaw_rad),
-    }
-}
-
-fn in_world(start: PlanarPose, pose: PlanarPose) -> PlanarPose {
-    let (cos, sin) = (libm::cos(start.yaw_rad), libm::sin(start.yaw_rad));
-    PlanarPose {
-        x_m: start.x_m + cos * pose.x_m - sin * pose.y_m,
-        y_m: start.y_m + sin * pose.x_m + cos * pose.y_m,
-        yaw_rad: homing_core::wrap_angle(start.yaw_rad + pose.yaw_rad),
     }
 }

@@ -10,7 +10,7 @@ use homing_core::{
 use homing_perception::AnyEstimator;
 use homing_planner::{Mission, Perception, Planner, PlannerObservation, StepEvent};
 use homing_sim::arena::Arena;
-use homing_sim::episode::{Episode, t_world_base};
+use homing_sim::episode::{Episode, in_odom};
 use homing_sim::oracle::{landing, perfect};
 use homing_sim::score::Finish;
 use homing_sim::simulator::Simulator;
@@ -138,10 +138,9 @@ impl<'a> Lockstep<'a> {
         robot.reset(episode)?;
         let rgb = Arc::new(episode.camera.photo(arena, episode.goal)?);
         estimator.set_goal(GoalPhoto { id: GOAL_ID, rgb, intrinsics: episode.camera.intrinsics()? })?;
-        let t_world_goal: Transform<_, Base> = t_world_base(arena, episode.goal.into());
         Ok(Self {
             planner: Planner::new(trial.planner.clone(), trial.policy.build(arena, episode)?)?,
-            goal_odom_truth: (robot.t_world_odom_truth().inverse() * t_world_goal).planar(),
+            goal_odom_truth: in_odom(arena, episode.start, episode.goal.into()),
             mission: Some(Mission::Start { goal_id: GOAL_ID }),
             motion: None,
             steps_left: trial.planner.step_budget,

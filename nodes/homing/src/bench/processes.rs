@@ -12,9 +12,7 @@ use homing_benchmark::cause::Moment;
 use homing_benchmark::episode::{EpisodeRun, StageSeconds, headings};
 use homing_benchmark::suite::{Course, Onlooker, Row};
 use homing_benchmark::{GoalPose, LastMile, Policy, RunError, Trial};
-use homing_core::{
-    Base, GoalEstimate, Mode, Motion, NavigationState, Odom, PlanarPose, Sighting, Stamp, Transform, UnseenReason,
-};
+use homing_core::{Base, GoalEstimate, Mode, Motion, NavigationState, Odom, Sighting, Stamp, Transform, UnseenReason};
 use homing_perception::PoseSolver;
 use homing_perception::onnx::SwitchChoice;
 use homing_planner::{Recovery, SwitchConfig, SwitchKind};
@@ -25,7 +23,7 @@ use homing_protocol::navigate::Outcome;
 use homing_protocol::{Session, Subscription, topics};
 use homing_sim::NoisePreset;
 use homing_sim::arena::Arena;
-use homing_sim::episode::Episode;
+use homing_sim::episode::{Episode, in_odom};
 use homing_sim::score::Finish;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -255,8 +253,7 @@ impl Heard {
     fn tell(self, arena: &Arena, episode: &Episode, trial: &Trial, onlooker: &mut Onlooker) -> anyhow::Result<Told> {
         let body = &trial.planner.body;
         let t_base_camera = trial.sim.camera.t_base_camera();
-        let start: PlanarPose = episode.start.into();
-        let goal_odom_truth = in_odom(arena, start, episode.goal.into());
+        let goal_odom_truth = in_odom(arena, episode.start, episode.goal.into());
         let mut told =
             Told { mode: Mode::Idle, last_mile_steps: 0, first_heading_rad: None, times: StageSeconds::default() };
         let n_steps = self.states_heard.len();
@@ -285,14 +282,6 @@ impl Heard {
         }
         Ok(told)
     }
-}
-
-/// A pose of the world frame in the odometry frame that began at `start`.
-fn in_odom(arena: &Arena, start: PlanarPose, pose: PlanarPose) -> PlanarPose {
-    let t_world_odom = homing_sim::episode::t_world_base(arena, start);
-    let t_world_pose = homing_sim::episode::t_world_base(arena, pose);
-    let t_odom_pose = t_world_odom.isometry().inverse() * t_world_pose.isometry();
-    Transform::<Odom, Base>::new(t_odom_pose).planar()
 }
 
 fn photo(arena: &Arena, episode: &Episode) -> anyhow::Result<EncodedPhoto> {
